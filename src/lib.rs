@@ -1,1 +1,12 @@
-//! pathblend
+//! pathblend renders a scene with several light transport algorithms, learns from path features which blend of them
+//! errs least, and blends. `ARCHITECTURE.md` is the map of the rooms below.
+
+pub mod bsdf;
+pub mod camera;
+pub mod emitter;
+pub mod film;
+pub mod geometry;
+pub mod image;
+pub mod math;
+pub mod scene;
+pub mod spectrum;

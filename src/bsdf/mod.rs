@@ -1,0 +1,157 @@
+//! Scattering at surfaces. Directions are unit vectors in the shading frame (normal = +z) and point away from the
+//! surface: `wi` back to the previous vertex of the walk, `wo` on to the next.
+//!
+//! A new variant: its file with `evaluate`, `sample`, `invert` side by side, one arm in each match below, one line in
+//! the law tests at the end. The compiler lists the arms.
+
+mod conductor;
+mod dielectric;
+mod diffuse;
+pub mod fresnel;
+mod microfacet;
+mod rough_conductor;
+
+pub use conductor::Conductor;
+pub use dielectric::Dielectric;
+pub use diffuse::Diffuse;
+pub use microfacet::{Distribution, Microfacet};
+pub use rough_conductor::RoughConductor;
+
+use crate::math::{Row, SolidAnglePdf, Walk};
+use crate::spectrum::Spectrum;
+use glam::DVec3;
+
+/// The letter that a vertex has in Heckbert's notation, for one pair of directions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Letter {
+    /// Diffuse-like.
+    D,
+    /// Specular-like: delta lobes, and microfacet lobes with α below [`GLOSSY_ALPHA`].
+    S,
+}
+
+/// Microfacet lobes with α below this roughness are specular-like (`S`), the others diffuse-like (`D`). At 0.2 a
+/// highlight spreads over some 25°: beyond, sampling its density by connections works as for diffuse surfaces.
+pub const GLOSSY_ALPHA: f64 = 0.2;
+
+/// What a connection needs to know of a scattering event with given directions.
+#[derive(Clone, Copy, Debug)]
+pub struct Evaluation {
+    /// BSDF value f in 1/sr, without cosine; delta lobes contribute nothing.
+    pub value: Spectrum,
+    /// Density with which [`Bsdf::sample`] takes `wi` to `wo`.
+    pub pdf: SolidAnglePdf,
+    /// Density with which it would take `wo` to `wi`.
+    pub pdf_reverse: SolidAnglePdf,
+    /// The letter of the vertex.
+    pub letter: Letter,
+}
+
+/// A sampled direction.
+#[derive(Clone, Copy, Debug)]
+pub struct Scatter {
+    /// The new direction, in the shading frame.
+    pub direction: DVec3,
+    /// f |cos θ| / pdf.
+    pub weight: Spectrum,
+    /// Density of the direction; for a delta lobe its probability.
+    pub pdf: SolidAnglePdf,
+    /// Density of the way back; for a delta lobe the coefficient of the same Dirac density as in `pdf`, that is the
+    /// probability of the lobe times dω_o / dω_i.
+    pub pdf_reverse: SolidAnglePdf,
+    /// Whether the lobe is a Dirac density.
+    pub delta: bool,
+    /// The letter of the vertex.
+    pub letter: Letter,
+    /// Relative refractive index that was passed (transmitted over incident side), 1 for a reflection.
+    pub eta: f64,
+}
+
+/// A scattering model.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Bsdf {
+    /// Lambertian reflection on the side of the normal.
+    Diffuse(Diffuse),
+    /// Mirror reflection by a metal on the side of the normal.
+    Conductor(Conductor),
+    /// Smooth boundary between two transparent media.
+    Dielectric(Dielectric),
+    /// Microfacet reflection by a metal on the side of the normal.
+    RoughConductor(RoughConductor),
+    /// One model for each side of the surface: on the side of the normal, and on the other.
+    TwoSided(Box<[Bsdf; 2]>),
+}
+
+/// Mirrors at the plane of the surface.
+#[inline]
+fn flip(w: DVec3) -> DVec3 {
+    DVec3::new(w.x, w.y, -w.z)
+}
+
+impl Bsdf {
+    /// Value, densities and letter for a pair of directions; `None` where the value is zero, always so for delta lobes.
+    #[inline]
+    pub fn evaluate(&self, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
+        match self {
+            Self::Diffuse(diffuse) => diffuse.evaluate(wi, wo),
+            Self::RoughConductor(rough) => rough.evaluate(wi, wo),
+            Self::Conductor(_) | Self::Dielectric(_) => None,
+            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].evaluate(wi, wo, walk),
+            Self::TwoSided(sides) => sides[1].evaluate(flip(wi), flip(wo), walk),
+        }
+    }
+
+    /// Samples a direction from the first three numbers of `row`; `None` where light is absorbed.
+    #[inline]
+    pub fn sample(&self, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
+        match self {
+            Self::Diffuse(diffuse) => diffuse.sample(wi, row),
+            Self::RoughConductor(rough) => rough.sample(wi, row),
+            Self::Conductor(conductor) => conductor.sample(wi),
+            Self::Dielectric(dielectric) => dielectric.sample(wi, row, walk),
+            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].sample(wi, row, walk),
+            Self::TwoSided(sides) => {
+                let scatter = sides[1].sample(flip(wi), row, walk)?;
+                Some(Scatter { direction: flip(scatter.direction), ..scatter })
+            }
+        }
+    }
+
+    /// A row that [`Bsdf::sample`] takes from `wi` to `wo`; numbers that the sampling leaves open are taken from
+    /// `gamma`. `None` where `wo` cannot be sampled.
+    pub fn invert(&self, wi: DVec3, wo: DVec3, gamma: Row) -> Option<Row> {
+        match self {
+            Self::Diffuse(diffuse) => diffuse.invert(wi, wo, gamma),
+            Self::RoughConductor(rough) => rough.invert(wi, wo, gamma),
+            Self::Conductor(conductor) => conductor.invert(wi, wo, gamma),
+            Self::Dielectric(dielectric) => dielectric.invert(wi, wo, gamma),
+            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].invert(wi, wo, gamma),
+            Self::TwoSided(sides) => sides[1].invert(flip(wi), flip(wo), gamma),
+        }
+    }
+
+    /// Whether all lobes are Dirac densities, so that no connection can be made at this surface.
+    #[inline]
+    pub fn is_delta(&self) -> bool {
+        match self {
+            Self::Diffuse(_) | Self::RoughConductor(_) => false,
+            Self::Conductor(_) | Self::Dielectric(_) => true,
+            Self::TwoSided(sides) => sides.iter().all(Self::is_delta),
+        }
+    }
+
+    /// Whether light that arrives from `wi` leaves diffuse-like: where photons are gathered.
+    #[inline]
+    pub fn gathers(&self, wi: DVec3) -> bool {
+        match self {
+            Self::Diffuse(_) => true,
+            Self::RoughConductor(rough) => rough.letter() == Letter::D,
+            Self::Conductor(_) | Self::Dielectric(_) => false,
+            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].gathers(wi),
+            Self::TwoSided(sides) => sides[1].gathers(flip(wi)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,125 @@
+//! Surfaces that shine evenly into the hemisphere of their normal.
+
+use super::Start;
+use crate::math::{AreaPdf, Discrete, Frame, Row, SolidAnglePdf, warp};
+use crate::spectrum::Spectrum;
+use glam::DVec3;
+use std::f64::consts::{FRAC_1_PI, PI};
+
+/// A shining surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Area {
+    /// Radiance on the side of the normal, in W/(m² sr).
+    pub radiance: Spectrum,
+    surface: Surface,
+    inverse_area: f64,
+}
+
+/// A surface that points are sampled on.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Surface {
+    /// Triangles, chosen by area; counter-clockwise as seen from the shining side.
+    Triangles {
+        /// Corner positions.
+        corners: Vec<[DVec3; 3]>,
+        /// Choice by area.
+        choice: Discrete,
+    },
+    /// A sphere that shines outwards.
+    Sphere {
+        /// Centre.
+        center: DVec3,
+        /// Radius, positive.
+        radius: f64,
+    },
+    /// A disk.
+    Disk {
+        /// Centre.
+        center: DVec3,
+        /// Unit normal on the shining side.
+        normal: DVec3,
+        /// Radius, positive.
+        radius: f64,
+    },
+}
+
+impl Surface {
+    /// The surface of some triangles; `None` when their area is zero or not finite.
+    pub fn triangles(corners: Vec<[DVec3; 3]>) -> Option<Self> {
+        let areas: Vec<f64> = corners.iter().map(triangle_area).collect();
+        Some(Self::Triangles { choice: Discrete::new(&areas)?, corners })
+    }
+
+    /// Area in m².
+    pub fn area(&self) -> f64 {
+        match self {
+            Self::Triangles { corners, .. } => corners.iter().map(triangle_area).sum(),
+            Self::Sphere { radius, .. } => 4.0 * PI * radius * radius,
+            Self::Disk { radius, .. } => PI * radius * radius,
+        }
+    }
+
+    /// A point with its normal, uniformly by area.
+    #[inline]
+    fn sample(&self, row: Row) -> (DVec3, DVec3) {
+        match self {
+            Self::Triangles { corners, choice } => {
+                let (index, u) = choice.sample(row[1]);
+                let [a, b, c] = corners[index];
+                let at = warp::triangle::sample([u, row[2]]);
+                (a + (b - a) * at.x + (c - a) * at.y, (b - a).cross(c - a).normalize())
+            }
+            Self::Sphere { center, radius } => {
+                let normal = warp::sphere::sample([row[1], row[2]]);
+                (*center + normal * *radius, normal)
+            }
+            Self::Disk { center, normal, radius } => {
+                let at = warp::disk::sample([row[1], row[2]]) * *radius;
+                let frame = Frame::around(*normal);
+                (*center + frame.tangent * at.x + frame.bitangent * at.y, *normal)
+            }
+        }
+    }
+}
+
+fn triangle_area([a, b, c]: &[DVec3; 3]) -> f64 {
+    0.5 * (b - a).cross(c - a).length()
+}
+
+impl Area {
+    /// A light of `radiance` on `surface`.
+    pub fn new(radiance: Spectrum, surface: Surface) -> Self {
+        Self { radiance, inverse_area: 1.0 / surface.area(), surface }
+    }
+
+    #[inline]
+    pub(super) fn start(&self, row: Row) -> (Start, AreaPdf) {
+        let (position, normal) = self.surface.sample(row);
+        (Start::Surface { position, normal }, self.start_pdf())
+    }
+
+    #[inline]
+    pub(super) fn start_pdf(&self) -> AreaPdf {
+        AreaPdf(self.inverse_area)
+    }
+
+    #[inline]
+    pub(super) fn radiance(&self, cos: f64) -> Spectrum {
+        if cos > 0.0 { self.radiance } else { Spectrum::BLACK }
+    }
+
+    #[inline]
+    pub(super) fn emit(&self, position: DVec3, normal: DVec3, row: Row) -> (DVec3, DVec3, Spectrum) {
+        let local = warp::hemisphere::sample([row[1], row[2]]);
+        (position, Frame::around(normal).to_world(local), self.radiance * PI)
+    }
+
+    #[inline]
+    pub(super) fn direction_pdf(&self, cos: f64) -> SolidAnglePdf {
+        SolidAnglePdf(cos.max(0.0) * FRAC_1_PI)
+    }
+
+    pub(super) fn power(&self) -> f64 {
+        self.radiance.luminance() * PI / self.inverse_area
+    }
+}

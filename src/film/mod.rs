@@ -1,0 +1,103 @@
+//! Accumulation of colour and of luminance per path class.
+//!
+//! The film is cut into bands of rows. A band is written by one job at a time, so sums are formed in an order that
+//! does not depend on the number of threads. Contributions to pixels that are not known beforehand (light tracing,
+//! Markov chains) are kept as [`Splat`]s by the job that makes them and added in the order of the jobs.
+
+mod band;
+mod class;
+mod kernel;
+mod splat;
+
+pub use band::Band;
+pub use class::{PathClass, Word};
+pub use kernel::{Filter, Kernel};
+pub use splat::{Splat, Splats};
+
+use crate::image::{Image, Layer};
+use ndarray::{Array2, Array3};
+use rayon::prelude::*;
+
+/// Rows in a band. Small enough that two threads share a film evenly, large enough that a band amortises its job.
+pub const BAND_ROWS: usize = 8;
+
+/// Counters of what went wrong, never silently dropped.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Health {
+    /// Contributions that were infinite or not a number; left out.
+    pub nonfinite: u64,
+    /// Contributions with a negative channel; left out.
+    pub negative: u64,
+}
+
+impl Health {
+    /// Adds the counts of another job.
+    pub fn add(&mut self, other: &Self) {
+        self.nonfinite += other.nonfinite;
+        self.negative += other.negative;
+    }
+}
+
+/// Sums over passes: colour and class luminances per pixel.
+pub struct Film {
+    /// Width and height in pixels.
+    pub size: [usize; 2],
+    /// Reconstruction filter.
+    pub kernel: Kernel,
+    bands: Vec<Band>,
+}
+
+impl Film {
+    /// A black film; `features` says whether class luminances are kept.
+    pub fn new(size: [usize; 2], filter: Filter, features: bool) -> Self {
+        let bands = (0..size[1].div_ceil(BAND_ROWS))
+            .map(|index| {
+                let first_row = index * BAND_ROWS;
+                Band::new(size[0], first_row, BAND_ROWS.min(size[1] - first_row), features)
+            })
+            .collect();
+        Self { size, kernel: Kernel::new(filter), bands }
+    }
+
+    /// Runs `job` once for each band, in parallel; results in the order of the bands.
+    pub fn for_each_band<R: Send>(&mut self, job: impl Fn(usize, &mut Band) -> R + Sync) -> Vec<R> {
+        self.bands.par_iter_mut().enumerate().map(|(index, band)| job(index, band)).collect()
+    }
+
+    /// Adds the splats of some jobs, in the order of the jobs, times `scale`.
+    pub fn splat(&mut self, jobs: &[Splats], scale: f64) {
+        self.bands.par_iter_mut().enumerate().for_each(|(index, band)| {
+            for splats in jobs {
+                for splat in splats.band(index) {
+                    band.splat(splat, scale);
+                }
+            }
+        });
+    }
+
+    /// What went wrong so far.
+    pub fn health(&self) -> Health {
+        let mut health = Health::default();
+        self.bands.iter().for_each(|band| health.add(&band.health));
+        health
+    }
+
+    /// The image: sums divided by the number of passes, class layers named `path_LDE` and so on.
+    pub fn develop(&self, passes: f64) -> Image {
+        let [width, height] = self.size;
+        let mut image = Image::new(width, height);
+        image.colour = Array3::from_shape_fn((height, width, 3), |(y, x, c)| {
+            (self.bands[y / BAND_ROWS].colour(x, y)[c] / passes) as f32
+        });
+        for class in PathClass::all() {
+            if self.bands.iter().all(|band| !band.has(class)) {
+                continue;
+            }
+            let layer = Array2::from_shape_fn((height, width), |(y, x)| {
+                (self.bands[y / BAND_ROWS].luminance(class, x, y) / passes) as f32
+            });
+            image.layers.insert(class.layer_name(), Layer::Luminance(layer));
+        }
+        image
+    }
+}

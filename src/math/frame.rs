@@ -1,0 +1,58 @@
+//! Orthonormal frames.
+
+use glam::DVec3;
+
+/// A right-handed orthonormal basis; `normal` is the local z axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    /// Local x axis in world space.
+    pub tangent: DVec3,
+    /// Local y axis in world space.
+    pub bitangent: DVec3,
+    /// Local z axis in world space.
+    pub normal: DVec3,
+}
+
+impl Frame {
+    /// Builds a frame around a unit `normal` (Duff et al. 2017, *Building an Orthonormal Basis, Revisited*).
+    #[inline]
+    pub fn around(normal: DVec3) -> Self {
+        let sign = 1f64.copysign(normal.z);
+        let a = -1.0 / (sign + normal.z);
+        let b = normal.x * normal.y * a;
+        Self {
+            tangent: DVec3::new(1.0 + sign * normal.x * normal.x * a, sign * b, -sign * normal.x),
+            bitangent: DVec3::new(b, sign + normal.y * normal.y * a, -normal.y),
+            normal,
+        }
+    }
+
+    /// Coordinates of the world vector `v` in this frame.
+    #[inline]
+    pub fn to_local(&self, v: DVec3) -> DVec3 {
+        DVec3::new(v.dot(self.tangent), v.dot(self.bitangent), v.dot(self.normal))
+    }
+
+    /// World vector of the local coordinates `v`.
+    #[inline]
+    pub fn to_world(&self, v: DVec3) -> DVec3 {
+        self.tangent * v.x + self.bitangent * v.y + self.normal * v.z
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_orthonormal_and_invert() {
+        let mut stream = crate::math::Stream::new(1, &[0]);
+        for _ in 0..10_000 {
+            let n = crate::math::warp::sphere::sample([stream.number(), stream.number()]);
+            let frame = Frame::around(n);
+            assert!((frame.tangent.cross(frame.bitangent) - n).length() < 1e-12);
+            let v = DVec3::new(stream.number(), stream.number(), stream.number());
+            assert!((frame.to_world(frame.to_local(v)) - v).length() < 1e-12);
+        }
+    }
+}

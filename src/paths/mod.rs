@@ -1,0 +1,16 @@
+//! Paths: subpaths from the camera and from the lights, their connections, and the weights of the techniques.
+//!
+//! A path x_0 … x_k has its first vertex on a light and its last on the camera. Technique (s, t) with s + t = k + 1
+//! samples x_0 … x_{s-1} from the light and the rest from the camera. One `trace`, one `connect` and one weight serve
+//! all integrators; they differ in where the rows of primary samples come from.
+
+mod connect;
+mod mis;
+mod rows;
+mod subpath;
+mod trace;
+
+pub use connect::{Connection, connect};
+pub use rows::{Fixed, Random, Rows};
+pub use subpath::{Subpath, Vertex, VertexKind};
+pub use trace::{trace_camera, trace_light};

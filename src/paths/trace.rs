@@ -1,0 +1,208 @@
+//! Random walks.
+
+use super::subpath::{Subpath, Vertex, VertexKind};
+use super::rows::Rows;
+use crate::emitter::{Emitter, Start};
+use crate::film::Word;
+use crate::geometry::Ray;
+use crate::math::{AreaPdf, Row, SolidAnglePdf, Walk};
+use crate::scene::{Scene, Surface};
+use crate::spectrum::Spectrum;
+use glam::{DVec2, DVec3};
+
+/// Walks from the camera through the film position `film`, up to `vertices` vertices. `rows.row(0)` must have been
+/// read by the caller, who made `film` of it, and is passed as `first`.
+pub fn trace_camera(
+    scene: &Scene,
+    film: DVec2,
+    first: Row,
+    rows: &mut impl Rows,
+    vertices: usize,
+    roulette_from: usize,
+    path: &mut Subpath,
+) {
+    path.vertices.clear();
+    path.film = film;
+    let lens = scene.camera.lens(first);
+    let direction = scene.camera.direction(lens, film);
+    path.vertices.push(Vertex {
+        kind: VertexKind::Camera,
+        position: lens,
+        back: DVec3::ZERO,
+        throughput: Spectrum::ONE,
+        forward: AreaPdf(1.0),
+        reverse: AreaPdf(0.0),
+        delta: false,
+        word: Word::EMPTY,
+    });
+    let pdf = scene.camera.direction_pdf(direction);
+    let walker = Walker { origin: lens, direction, throughput: Spectrum::ONE, pdf, word: Word::EMPTY };
+    walk(scene, walker, Walk::FromCamera, rows, vertices, roulette_from, path);
+}
+
+/// Walks from a light, up to `vertices` vertices, of which the first lies on the light.
+pub fn trace_light(scene: &Scene, rows: &mut impl Rows, vertices: usize, roulette_from: usize, path: &mut Subpath) {
+    path.vertices.clear();
+    if vertices == 0 {
+        return;
+    }
+    let Some((id, start, pdf)) = scene.sample_start(rows.row(0)) else { return };
+    let (position, offset_normal) = match start {
+        Start::Surface { position, normal } => (position, normal),
+        Start::Point { position } => (position, DVec3::ZERO),
+        Start::Infinite { .. } => (DVec3::ZERO, DVec3::ZERO),
+    };
+    path.vertices.push(Vertex {
+        kind: VertexKind::Light(id, start),
+        position,
+        back: DVec3::ZERO,
+        throughput: Spectrum::ONE / pdf.0,
+        forward: pdf,
+        reverse: AreaPdf(0.0),
+        delta: false,
+        word: Word::EMPTY,
+    });
+    if vertices == 1 {
+        return;
+    }
+    let emitter = scene.emitter(id);
+    let Some((origin, direction, weight)) = emitter.emit(&start, rows.row(1)) else { return };
+    let walker = Walker {
+        origin: origin + offset_normal * light_offset(origin),
+        direction,
+        throughput: weight / pdf.0,
+        pdf: SolidAnglePdf(0.0),
+        word: Word::EMPTY,
+    };
+    walk(scene, walker, Walk::FromLight, rows, vertices, roulette_from, path);
+}
+
+/// Distance by which rays are started off a light at `position`.
+#[inline]
+pub(super) fn light_offset(position: DVec3) -> f64 {
+    4e-12 * position.abs().max_element()
+}
+
+/// The end of a walk that goes on.
+struct Walker {
+    origin: DVec3,
+    direction: DVec3,
+    throughput: Spectrum,
+    /// Density of `direction`.
+    pdf: SolidAnglePdf,
+    word: Word,
+}
+
+/// Extends `path`, whose first vertex is there, by `walker` and what it meets.
+fn walk(
+    scene: &Scene,
+    mut walker: Walker,
+    mode: Walk,
+    rows: &mut impl Rows,
+    vertices: usize,
+    roulette_from: usize,
+    path: &mut Subpath,
+) {
+    // Both walks read row i at vertex i; from a light, row 1 went into the emission, so scattering is one row later.
+    let row_shift = usize::from(mode == Walk::FromLight);
+    while path.vertices.len() < vertices {
+        let last = path.vertices.len() - 1;
+        let ray = Ray { origin: walker.origin, direction: walker.direction, tmax: f64::INFINITY };
+        let Some(surface) = scene.intersect(&ray) else {
+            if let (Walk::FromCamera, Some(id)) = (mode, scene.environment()) {
+                path.vertices.push(environment_vertex(id, &walker));
+            }
+            return;
+        };
+        let vertex = surface_vertex(scene, &surface, &walker, &path.vertices[last]);
+        path.vertices.push(vertex);
+        if path.vertices.len() == vertices {
+            return;
+        }
+        let row = rows.row(last + 1 + row_shift);
+        let wi = surface.frame.to_local(vertex.back);
+        let Some(scatter) = scene.bsdf(surface.bsdf).sample(wi, row, mode) else { return };
+        let direction = surface.frame.to_world(scatter.direction);
+        let mut weight = scatter.weight * shading_correction(&surface, vertex.back, direction, mode);
+        if rows.roulette() && last + 1 >= roulette_from {
+            let survival = (weight.max_element() * scatter.eta * scatter.eta).min(0.95);
+            if row[3] >= survival {
+                return;
+            }
+            weight = weight / survival;
+        }
+        if weight.is_black() {
+            return;
+        }
+        path.vertices[last].reverse = reverse_pdf(&path.vertices[last], &vertex, scatter.pdf_reverse);
+        let word = match mode {
+            Walk::FromCamera => vertex.word.preceded_by(scatter.letter),
+            Walk::FromLight => vertex.word.then(scatter.letter),
+        };
+        walker = Walker {
+            origin: surface.leave(direction),
+            direction,
+            throughput: vertex.throughput * weight,
+            pdf: scatter.pdf,
+            word,
+        };
+    }
+}
+
+fn environment_vertex(id: crate::scene::EmitterId, walker: &Walker) -> Vertex {
+    Vertex {
+        kind: VertexKind::Environment(id),
+        position: walker.origin,
+        back: -walker.direction,
+        throughput: walker.throughput,
+        forward: AreaPdf(walker.pdf.0),
+        reverse: AreaPdf(0.0),
+        delta: false,
+        word: walker.word,
+    }
+}
+
+#[inline]
+fn surface_vertex(scene: &Scene, surface: &Surface, walker: &Walker, previous: &Vertex) -> Vertex {
+    let cos = surface.geometric.dot(walker.direction);
+    let distance_squared = (surface.position - previous.position).length_squared();
+    let forward = match &previous.kind {
+        VertexKind::Light(id, start) => scene.emitter(*id).emit_pdf(start, walker.direction, cos, distance_squared),
+        _ => walker.pdf.to_area(cos, distance_squared),
+    };
+    Vertex {
+        kind: VertexKind::Surface(*surface),
+        position: surface.position,
+        back: -walker.direction,
+        throughput: walker.throughput,
+        forward,
+        reverse: AreaPdf(0.0),
+        delta: scene.bsdf(surface.bsdf).is_delta(),
+        word: walker.word,
+    }
+}
+
+/// Density of `vertex` for a walk that scatters at `next` towards it with density `pdf`.
+#[inline]
+pub(super) fn reverse_pdf(vertex: &Vertex, next: &Vertex, pdf: SolidAnglePdf) -> AreaPdf {
+    let distance_squared = (vertex.position - next.position).length_squared();
+    match &vertex.kind {
+        VertexKind::Surface(surface) => pdf.to_area(surface.geometric.dot(next.back), distance_squared),
+        VertexKind::Light(_, start) => Emitter::arrival_pdf(start, pdf, next.back, distance_squared),
+        VertexKind::Environment(_) => AreaPdf(pdf.0),
+        VertexKind::Camera => AreaPdf(0.0),
+    }
+}
+
+/// Factor for walks from the light where the shading normal differs from the true one (Veach 1997, eq. 5.19):
+/// |ω_i·n_s| |ω_o·n_g| / (|ω_i·n_g| |ω_o·n_s|) with ω_i back along the walk; the cosine with the shading normal that
+/// the sampling weight holds is |ω_o·n_s|.
+#[inline]
+pub(super) fn shading_correction(surface: &Surface, back: DVec3, onward: DVec3, mode: Walk) -> f64 {
+    if mode == Walk::FromCamera || surface.frame.normal == surface.geometric {
+        return 1.0;
+    }
+    let (shading, geometric) = (surface.frame.normal, surface.geometric);
+    let denominator = (back.dot(geometric) * onward.dot(shading)).abs();
+    if denominator == 0.0 { 0.0 } else { (back.dot(shading) * onward.dot(geometric)).abs() / denominator }
+}

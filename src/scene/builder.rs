@@ -1,0 +1,201 @@
+//! Assembles a [`Scene`] from what a file says.
+
+use super::{BsdfId, EmitterId, Scene, Shape};
+use crate::bsdf::Bsdf;
+use crate::camera::Camera;
+use crate::emitter::{Area, Constant, Emitter, Surface};
+use crate::film::Filter;
+use crate::geometry::{Bvh, Solid};
+use crate::math::Discrete;
+use crate::spectrum::Spectrum;
+use glam::{DVec3, Vec3};
+use thiserror::Error;
+
+/// A triangle mesh in world space.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Positions.
+    pub positions: Vec<Vec3>,
+    /// Unit normals per position; empty for a mesh with flat faces.
+    pub normals: Vec<Vec3>,
+    /// Indices into the positions, counter-clockwise as seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// What the scene file says about the image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FilmSpec {
+    /// Width and height in pixels.
+    pub size: [usize; 2],
+    /// Reconstruction filter.
+    pub filter: Filter,
+}
+
+/// What an emitter of the scene is made from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shine {
+    /// The same radiance from everywhere outside the scene.
+    Environment(Spectrum),
+    /// A point light: position, intensity.
+    Point(DVec3, Spectrum),
+}
+
+/// Why a scene cannot be built.
+#[derive(Debug, Error, PartialEq)]
+pub enum SceneError {
+    /// A mesh refers to vertices that it does not have.
+    #[error("a mesh of {vertices} vertices refers to vertex {index}")]
+    VertexOutOfRange {
+        /// The index.
+        index: u32,
+        /// Number of vertices.
+        vertices: usize,
+    },
+    /// Positions or normals are not finite.
+    #[error("a mesh has a coordinate that is not a finite number")]
+    NotFinite,
+    /// A second environment.
+    #[error("a scene can have one environment emitter only")]
+    TwoEnvironments,
+    /// An area light without area.
+    #[error("an area emitter sits on a shape without area")]
+    NoArea,
+}
+
+/// Collects the parts of a scene.
+#[derive(Default)]
+pub struct Builder {
+    vertices: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    triangle_shapes: Vec<u32>,
+    solids: Vec<Solid>,
+    solid_shapes: Vec<u32>,
+    shapes: Vec<Shape>,
+    bsdfs: Vec<Bsdf>,
+    emitters: Vec<Emitter>,
+    environment: Option<Spectrum>,
+    hasher: blake3::Hasher,
+}
+
+impl Builder {
+    /// An empty scene.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a scattering model.
+    pub fn bsdf(&mut self, bsdf: Bsdf) -> BsdfId {
+        self.bsdfs.push(bsdf);
+        BsdfId(self.bsdfs.len() as u32 - 1)
+    }
+
+    /// Adds a mesh, which shines with `radiance` where one is given.
+    pub fn mesh(&mut self, mesh: Mesh, bsdf: BsdfId, radiance: Option<Spectrum>) -> Result<(), SceneError> {
+        if !mesh.positions.iter().chain(&mesh.normals).all(|v| v.is_finite()) {
+            return Err(SceneError::NotFinite);
+        }
+        if let Some(index) = mesh.triangles.iter().flatten().find(|i| **i as usize >= mesh.positions.len()) {
+            return Err(SceneError::VertexOutOfRange { index: *index, vertices: mesh.positions.len() });
+        }
+        let corner = |i: u32| mesh.positions[i as usize].as_dvec3();
+        let surface = |()| Surface::triangles(mesh.triangles.iter().map(|t| t.map(corner)).collect());
+        let shape = self.shape(bsdf, radiance, surface)?;
+        let base = self.vertices.len() as u32;
+        self.triangles.extend(mesh.triangles.iter().map(|t| t.map(|i| i + base)));
+        self.triangle_shapes.resize(self.triangles.len(), shape);
+        self.normals.extend(&mesh.normals);
+        self.vertices.extend(&mesh.positions);
+        self.normals.resize(self.vertices.len(), Vec3::ZERO);
+        Ok(())
+    }
+
+    /// Adds a sphere or a disk, which shines with `radiance` where one is given.
+    pub fn solid(&mut self, solid: Solid, bsdf: BsdfId, radiance: Option<Spectrum>) -> Result<(), SceneError> {
+        let surface = |()| {
+            Some(match &solid {
+                Solid::Sphere { center, radius } => Surface::Sphere { center: *center, radius: *radius },
+                Solid::Disk { center, normal, radius } => {
+                    Surface::Disk { center: *center, normal: *normal, radius: *radius }
+                }
+            })
+            .filter(|surface| surface.area() > 0.0)
+        };
+        let shape = self.shape(bsdf, radiance, surface)?;
+        self.solids.push(solid);
+        self.solid_shapes.push(shape);
+        Ok(())
+    }
+
+    fn shape(
+        &mut self,
+        bsdf: BsdfId,
+        radiance: Option<Spectrum>,
+        surface: impl FnOnce(()) -> Option<Surface>,
+    ) -> Result<u32, SceneError> {
+        let emitter = match radiance.filter(|radiance| !radiance.is_black()) {
+            Some(radiance) => {
+                let surface = surface(()).ok_or(SceneError::NoArea)?;
+                self.emitters.push(Emitter::Area(Area::new(radiance, surface)));
+                Some(EmitterId(self.emitters.len() as u32 - 1))
+            }
+            None => None,
+        };
+        self.shapes.push(Shape { bsdf, emitter });
+        Ok(self.shapes.len() as u32 - 1)
+    }
+
+    /// Adds an emitter that is not a shape.
+    pub fn emitter(&mut self, shine: Shine) -> Result<(), SceneError> {
+        match shine {
+            Shine::Environment(_) if self.environment.is_some() => return Err(SceneError::TwoEnvironments),
+            Shine::Environment(radiance) => self.environment = Some(radiance),
+            Shine::Point(position, intensity) => {
+                self.emitters.push(Emitter::Point(crate::emitter::Point { position, intensity }));
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds bytes that decide the image to the scene's fingerprint, such as the text of the scene file.
+    pub fn fingerprint(&mut self, bytes: &[u8]) {
+        self.hasher.update(&(bytes.len() as u64).to_le_bytes());
+        self.hasher.update(bytes);
+    }
+
+    /// The scene as seen by `camera`. Builds the acceleration structure.
+    pub fn build(mut self, camera: Camera, film: FilmSpec, max_depth: usize) -> Result<Scene, SceneError> {
+        let bvh = Bvh::build(&self.vertices, &self.triangles, &self.solids);
+        let environment = self.environment.filter(|radiance| !radiance.is_black()).map(|radiance| {
+            let (center, radius) = bounding_sphere(&bvh);
+            self.emitters.push(Emitter::Constant(Constant { radiance, center, radius }));
+            EmitterId(self.emitters.len() as u32 - 1)
+        });
+        let powers: Vec<f64> = self.emitters.iter().map(Emitter::power).collect();
+        Ok(Scene {
+            camera,
+            film,
+            max_depth,
+            hash: self.hasher.finalize().to_hex()[..32].to_owned(),
+            vertices: self.vertices,
+            normals: self.normals,
+            triangles: self.triangles,
+            triangle_shapes: self.triangle_shapes,
+            solids: self.solids,
+            solid_shapes: self.solid_shapes,
+            shapes: self.shapes,
+            bsdfs: self.bsdfs,
+            lights: Discrete::new(&powers),
+            emitters: self.emitters,
+            environment,
+            bvh,
+        })
+    }
+}
+
+/// A sphere around the geometry; a unit sphere where there is none.
+fn bounding_sphere(bvh: &Bvh) -> (DVec3, f64) {
+    let (min, max) = bvh.bounds();
+    let radius = 0.5 * (max - min).length() * (1.0 + 1e-6);
+    if radius.is_finite() && radius > 0.0 { (0.5 * (min + max), radius) } else { (DVec3::ZERO, 1.0) }
+}

@@ -1,0 +1,36 @@
+//! A point on a surface, with everything that scattering there needs.
+
+use super::{BsdfId, EmitterId};
+use crate::math::Frame;
+use glam::DVec3;
+
+/// Distance by which rays are started off a surface, relative to the largest coordinate that its position was computed
+/// from. Positions carry an error of some 1e-15 of that, so this is a wide margin, and still small against anything
+/// that a scene shows.
+pub(super) const RELATIVE_OFFSET: f64 = 1e-12;
+
+/// A point on a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Surface {
+    /// The point.
+    pub position: DVec3,
+    /// Unit normal of the true surface, on the side of the shading normal.
+    pub geometric: DVec3,
+    /// Shading frame.
+    pub frame: Frame,
+    /// How it scatters.
+    pub bsdf: BsdfId,
+    /// Whether it shines.
+    pub emitter: Option<EmitterId>,
+    /// Distance by which rays are started off the surface.
+    pub offset: f64,
+}
+
+impl Surface {
+    /// Where a ray starts that leaves towards `direction`: moved off the surface by more than the rounding errors of
+    /// its position, on the side that the ray goes to.
+    #[inline]
+    pub fn leave(&self, direction: DVec3) -> DVec3 {
+        self.position + self.geometric * self.offset.copysign(self.geometric.dot(direction))
+    }
+}
