@@ -7,6 +7,7 @@ pub mod emitter;
 pub mod film;
 pub mod geometry;
 pub mod image;
+pub mod load;
 pub mod math;
 pub mod scene;
 pub mod spectrum;
