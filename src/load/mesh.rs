@@ -56,12 +56,11 @@ impl RawMesh {
         }
     }
 
-    /// The flat mesh in world space, outside kept outside: for the built-in shapes, whose normals Mitsuba moves by the
-    /// inverse transpose. A mirrored shape would turn inside out otherwise.
-    pub fn place_solid(mut self, to_world: &DAffine3, facing: Facing) -> Mesh {
-        let mirrored = to_world.matrix3.determinant() < 0.0 && !facing.face_normals;
-        self.normals.clear();
-        self.place(to_world, Facing { face_normals: true, flip_normals: facing.flip_normals != mirrored })
+    /// The mesh in world space with flat faces, outside kept outside: for the built-in shapes, whose normals Mitsuba
+    /// moves by the inverse transpose. A mirrored shape would turn inside out otherwise.
+    pub fn place_solid(self, to_world: &DAffine3, flip_normals: bool) -> Mesh {
+        let mirrored = to_world.matrix3.determinant() < 0.0;
+        self.place(to_world, Facing { face_normals: true, flip_normals: flip_normals != mirrored })
     }
 }
 

@@ -7,6 +7,7 @@ use super::transform;
 use super::value::Text;
 use crate::spectrum::Spectrum;
 use glam::{DAffine3, DVec3};
+use std::collections::HashSet;
 
 /// Linear Rec.709 of a spectrum that is one at all wavelengths: XYZ = (1, 1, 1).
 const EQUAL_ENERGY: Spectrum = Spectrum::rgb(1.204_794, 0.948_291, 0.908_916);
@@ -49,12 +50,9 @@ impl<'a> Plugin<'a> {
         element.only(&["type", "id", "name"])?;
         let kind = element.required("type")?.text;
         let children: Vec<_> = element.children().collect();
-        for (index, child) in children.iter().enumerate() {
-            let Some(name) = child.attribute("name") else {
-                continue;
-            };
-            let earlier = children[..index].iter().filter_map(|child| child.attribute("name"));
-            if earlier.map(|earlier| earlier.text).any(|earlier| earlier == name.text) {
+        let mut names = HashSet::new();
+        for name in children.iter().filter_map(|child| child.attribute("name")) {
+            if !names.insert(name.text) {
                 return Err(name.error(format!("the parameter `{}` is given twice", name.text)));
             }
         }

@@ -10,6 +10,9 @@ use std::io::Cursor;
 /// Names that files use for the corners of a face.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
+/// Most characters of the parser's message that are passed on: it quotes the file.
+const SHOWN: usize = 200;
+
 #[derive(Default)]
 struct Vertex {
     position: [f64; 3],
@@ -44,7 +47,8 @@ impl PropertyAccess for Vertex {
 
 #[derive(Default)]
 struct Face {
-    corners: Vec<u32>,
+    /// `None` where they are no indices.
+    corners: Option<Vec<u32>>,
 }
 
 impl PropertyAccess for Face {
@@ -56,10 +60,7 @@ impl PropertyAccess for Face {
         if !CORNERS.contains(&name) {
             return PropertyAccessResult::Ignored;
         }
-        match property.to_u32_list() {
-            Some(corners) => self.corners = corners,
-            None => return PropertyAccessResult::UnsupportedType,
-        }
+        self.corners = property.to_u32_list();
         PropertyAccessResult::Set
     }
 }
@@ -80,7 +81,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<RawMesh, String> {
 
 fn parse(bytes: &[u8]) -> Result<RawMesh, String> {
     let mut reader = Reader::new(Cursor::new(bytes));
-    let one_line = |error: ply_rs_bw::parser::ParseError| error.to_string().replace("\n\t", " ");
+    let one_line = |error: ply_rs_bw::parser::ParseError| {
+        let text = error.to_string();
+        let words: Vec<_> = text.split_whitespace().collect();
+        words.join(" ").chars().take(SHOWN).collect::<String>()
+    };
     let header = Parser::<Vertex>::new().read_header(&mut reader).map_err(one_line)?;
     let has_normals = check(&header, bytes.len())?;
     let mut mesh = RawMesh::default();
@@ -97,7 +102,9 @@ fn parse(bytes: &[u8]) -> Result<RawMesh, String> {
             "face" => {
                 let parser = Parser::<Face>::new();
                 let faces = parser.read_payload_for_element(&mut reader, element, &header).map_err(one_line)?;
-                mesh.triangles = faces.iter().flat_map(|face| fan(&face.corners)).collect();
+                let corners: Option<Vec<_>> = faces.iter().map(|face| face.corners.as_deref()).collect();
+                let corners = corners.ok_or("a face has a corner that is no index from 0")?;
+                mesh.triangles = corners.into_iter().flat_map(fan).collect();
             }
             _ => {
                 let parser = Parser::<Other>::new();
@@ -189,9 +196,9 @@ mod tests {
         let short = |count| header("ascii", count);
         let cases: [(String, &str); 5] = [
             (short(1) + "0 0 0\n0 3 0 0 0\n0 3 0 0 1\n", "a face refers to vertex 1 of 1"),
-            (short(1) + "0 0 0\n0 3 0 0 -1\n", "Line 11"),
+            (short(1) + "0 0 0\n0 3 0 0 -1\n0 3 0 0 0\n", "a face has a corner that is no index from 0"),
             (short(9_999_999_999), "its header promises 10000000001 elements"),
-            (short(3), "Line 10: Unexpected end of file"),
+            (short(3), "Line 11: Unexpected end of file"),
             ("ply\nformat ascii 1.0\nelement vertex 0\nend_header\n".into(), "it has no element `face`"),
         ];
         for (text, message) in cases {

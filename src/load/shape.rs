@@ -57,8 +57,8 @@ pub(super) fn read(element: Element<'_>) -> Result<Shape<'_>, LoadError> {
         kind => {
             let facing = Facing { face_normals: plugin.boolean("face_normals")?, flip_normals };
             Form::Mesh(match kind {
-                "rectangle" => mesh::rectangle().place_solid(&to_world, facing),
-                "cube" => mesh::cube().place_solid(&to_world, facing),
+                "rectangle" => mesh::rectangle().place_solid(&to_world, flip_normals),
+                "cube" => mesh::cube().place_solid(&to_world, flip_normals),
                 _ => {
                     let (raw, bytes) = mesh_file(&mut plugin)?;
                     file = Some(bytes);

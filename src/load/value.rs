@@ -76,7 +76,7 @@ impl Text<'_> {
             let [r, g, b] = self.triple()?.to_array();
             return Ok(Spectrum::rgb(r, g, b));
         };
-        let code = u32::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 6);
+        let code = u32::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 6 && !digits.starts_with('+'));
         let [_, r, g, b] = code.ok_or_else(|| self.expected("#RRGGBB in hexadecimal digits"))?.to_be_bytes();
         Ok(Spectrum::rgb(r.into(), g.into(), b.into()) / 255.0)
     }
