@@ -49,11 +49,11 @@ impl Bench {
     }
 }
 
-/// Changes up to four bytes.
+/// Changes one byte or two.
 fn damage(bytes: &[u8], stream: &mut Stream) -> Vec<u8> {
     let mut damaged = bytes.to_vec();
     let mut below = |n: usize| (stream.number() * n as f64) as usize;
-    for _ in 0..=below(4) {
+    for _ in 0..=below(2) {
         let at = below(damaged.len());
         match below(4) {
             0 => damaged[at] ^= 1 << below(8),
@@ -78,8 +78,8 @@ fn truncated_scenes_are_refused() {
 fn damaged_scenes_do_not_panic() {
     let (bench, whole) = (Bench::new(), reference("shapes.xml"));
     let mut stream = Stream::new(1, &[]);
-    let accepted = (0..600).filter(|_| bench.scene(&damage(&whole, &mut stream))).count();
-    assert!((20..580).contains(&accepted), "{accepted}");
+    let accepted = (0..300).filter(|_| bench.scene(&damage(&whole, &mut stream))).count();
+    assert!((10..290).contains(&accepted), "{accepted}");
 }
 
 #[test]
@@ -89,11 +89,11 @@ fn damaged_meshes_do_not_panic() {
     for name in ["bare.obj", "smooth.obj", "bare.ply", "smooth.ply"] {
         let (kind, whole) = (&name[name.len() - 3..], reference(name));
         assert!(bench.mesh(kind, &whole));
-        for length in (0..whole.len()).step_by(7) {
+        for length in (0..whole.len()).step_by(11) {
             bench.mesh(kind, &whole[..length]);
         }
-        let accepted = (0..400).filter(|_| bench.mesh(kind, &damage(&whole, &mut stream))).count();
-        assert!((5..400).contains(&accepted), "{name}: {accepted}");
+        let accepted = (0..150).filter(|_| bench.mesh(kind, &damage(&whole, &mut stream))).count();
+        assert!((1..150).contains(&accepted), "{name}: {accepted}");
     }
 }
 

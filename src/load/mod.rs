@@ -203,7 +203,7 @@ fn shine(element: Element<'_>) -> Result<Shine, LoadError> {
         "constant" => Shine::Environment(plugin.light("radiance")?),
         "point" => {
             let intensity = plugin.light("intensity")?;
-            let (to_world, transform) = plugin.to_world()?;
+            let (to_world, transform) = plugin.placement()?;
             let position = match plugin.point("position")? {
                 Some(_) if transform.tag() == "transform" => {
                     return Err(transform.error("a point emitter with both `position` and `to_world`; expected one"));

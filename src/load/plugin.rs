@@ -143,7 +143,7 @@ impl<'a> Plugin<'a> {
     }
 
     /// A transformation that can be undone, with its place; the identity where it is not given.
-    pub fn to_world(&mut self) -> Result<(DAffine3, Element<'a>), LoadError> {
+    pub fn placement(&mut self) -> Result<(DAffine3, Element<'a>), LoadError> {
         match self.take("to_world", &["transform"])? {
             Some(element) => Ok((transform::read(element)?, element)),
             None => Ok((DAffine3::IDENTITY, self.element)),

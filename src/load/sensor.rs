@@ -29,7 +29,7 @@ pub(super) fn read(element: Element<'_>, size: Option<[usize; 2]>) -> Result<(Ca
     plugin.objects("sampler")?;
     let mut film = plugin.object("film")?.map_or(Ok(default_film()), film)?;
     film.size = size.unwrap_or(film.size);
-    let (to_world, transform) = plugin.to_world()?;
+    let (to_world, transform) = plugin.placement()?;
     let half = half_extent(&mut plugin, film.size)?;
     plugin.ignore(&["near_clip", "shutter_open", "shutter_close"]);
     // Mitsuba focuses at the far clipping plane where nothing else is said.
@@ -51,10 +51,9 @@ pub(super) fn read(element: Element<'_>, size: Option<[usize; 2]>) -> Result<(Ca
 
 /// Orthonormal axes of a camera. Scale is left aside; left-handed axes stay left-handed.
 fn axes(to_world: &DAffine3) -> Option<Frame> {
-    let [x, y, z] = [0, 1, 2].map(|i| to_world.matrix3.col(i).normalize());
-    let skew = [x.dot(y), y.dot(z), z.dot(x)].map(f64::abs).into_iter().fold(0.0, f64::max);
-    // Not a number where an axis has no length.
-    if !(skew <= SKEW_TOLERANCE) {
+    let axis = |i| to_world.matrix3.col(i).try_normalize();
+    let (x, y, z) = (axis(0)?, axis(1)?, axis(2)?);
+    if [x.dot(y), y.dot(z), z.dot(x)].iter().any(|cosine| cosine.abs() > SKEW_TOLERANCE) {
         return None;
     }
     let bitangent = (y - z * y.dot(z)).normalize();

@@ -45,7 +45,7 @@ pub(super) fn read(element: Element<'_>) -> Result<Shape<'_>, LoadError> {
     if !KINDS.contains(&plugin.kind) {
         return Err(plugin.unknown(&KINDS));
     }
-    let (to_world, transform) = plugin.to_world()?;
+    let (to_world, transform) = plugin.placement()?;
     let flip_normals = plugin.boolean("flip_normals")?;
     let (mut turned, mut file) = (false, None);
     let form = match plugin.kind {

@@ -1,0 +1,141 @@
+//! Parameters and defaults arrive in the scene as Mitsuba 3 understands them.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use glam::DVec3;
+use pathblend::bsdf::{Bsdf, Conductor, Dielectric, Diffuse, Distribution, Microfacet, RoughConductor};
+use pathblend::film::Filter;
+use pathblend::geometry::Ray;
+use pathblend::load::{self, Options, UNBOUNDED_DEPTH};
+use pathblend::scene::Scene;
+use pathblend::spectrum::Spectrum;
+
+const SENSOR: &str = "<sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/></sensor>";
+
+fn load_bare(body: &str) -> Scene {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.xml");
+    std::fs::write(&path, format!("<scene version=\"3.0.0\">{body}</scene>")).unwrap();
+    load::read(&path, &Options::default()).unwrap_or_else(|error| panic!("{error}")).scene
+}
+
+fn load(body: &str) -> Scene {
+    load_bare(&format!("{SENSOR}{body}"))
+}
+
+/// The models in use when a sphere has the model `xml`.
+fn bsdfs(xml: &str) -> Vec<Bsdf> {
+    load(&format!("<shape type=\"sphere\">{xml}</shape>")).bsdfs().to_vec()
+}
+
+fn grey(reflectance: f64) -> Bsdf {
+    Bsdf::Diffuse(Diffuse { reflectance: Spectrum::grey(reflectance) })
+}
+
+fn glass(eta: f64) -> Bsdf {
+    let one = Spectrum::ONE;
+    Bsdf::Dielectric(Dielectric { eta, specular_reflectance: one, specular_transmittance: one })
+}
+
+const MIRROR: Conductor = Conductor { index: None, specular_reflectance: Spectrum::ONE };
+
+#[test]
+fn bsdfs_have_mitsubas_defaults() {
+    assert_eq!(bsdfs(""), [grey(0.5)]);
+    assert_eq!(bsdfs("<bsdf type=\"diffuse\"/>"), [grey(0.5)]);
+    assert_eq!(bsdfs("<bsdf type=\"conductor\"/>"), [Bsdf::Conductor(MIRROR)]);
+    assert_eq!(bsdfs("<bsdf type=\"dielectric\"/>"), [glass(1.5046 / 1.000277)]);
+    let microfacet = Microfacet { distribution: Distribution::Beckmann, alpha: 0.1 };
+    let rough = Bsdf::RoughConductor(RoughConductor { metal: MIRROR, microfacet });
+    assert_eq!(bsdfs("<bsdf type=\"roughconductor\"/>"), [rough]);
+}
+
+#[test]
+fn bsdfs_have_their_parameters() {
+    let copper = r#"<bsdf type="roughconductor">
+        <rgb name="eta" value="0.2, 0.92, 1.1"/> <spectrum name="k" value="2.5"/> <float name="alpha" value="0.3"/>
+        <string name="distribution" value="ggx"/> <float name="specular_reflectance" value="0.9"/></bsdf>"#;
+    let index = Some((Spectrum::rgb(0.2, 0.92, 1.1), Spectrum::grey(2.5)));
+    let metal = Conductor { index, specular_reflectance: Spectrum::grey(0.9) };
+    let microfacet = Microfacet { distribution: Distribution::Ggx, alpha: 0.3 };
+    assert_eq!(bsdfs(copper), [Bsdf::RoughConductor(RoughConductor { metal, microfacet })]);
+    let diamond = r#"<bsdf type="dielectric"><string name="int_ior" value="Diamond"/>
+        <float name="ext_ior" value="1.25"/></bsdf>"#;
+    assert_eq!(bsdfs(diamond), [glass(2.419 / 1.25)]);
+    let paper = r#"<bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="0.2"/></bsdf>
+        <bsdf type="conductor"/></bsdf>"#;
+    assert_eq!(bsdfs(paper), [Bsdf::TwoSided(Box::new([grey(0.2), Bsdf::Conductor(MIRROR)]))]);
+}
+
+#[test]
+fn shared_models_are_added_once_and_unused_ones_never() {
+    let sphere = "<shape type=\"sphere\"><ref id=\"a\"/></shape>";
+    let models = "<bsdf type=\"dielectric\" id=\"a\"/><bsdf type=\"diffuse\" id=\"b\"/>";
+    assert_eq!(load(&format!("{sphere}{models}{sphere}")).bsdfs(), [glass(1.5046 / 1.000277)]);
+}
+
+/// A mirrored sphere is turned inside out, as in Mitsuba: its glass lies outside.
+#[test]
+fn spheres_can_be_turned_inside_out() {
+    let glass_of = |extra: &str| {
+        let body = "<bsdf type=\"dielectric\"><float name=\"int_ior\" value=\"2\"/>\
+                    <float name=\"ext_ior\" value=\"1\"/></bsdf>";
+        bsdfs(&format!("{body}{extra}"))
+    };
+    let flip = "<boolean name=\"flip_normals\" value=\"true\"/>";
+    let mirror = "<transform name=\"to_world\"><scale x=\"-1\"/></transform>";
+    assert_eq!(glass_of(""), [glass(2.0)]);
+    assert_eq!(glass_of(flip), [glass(0.5)]);
+    assert_eq!(glass_of(mirror), [glass(0.5)]);
+    assert_eq!(glass_of(&format!("{flip}{mirror}")), [glass(2.0)]);
+}
+
+#[test]
+fn film_and_depth_are_taken() {
+    let scene = load("");
+    assert_eq!((scene.film.size, scene.film.filter), ([768, 576], Filter::Gaussian { stddev: 0.5 }));
+    assert_eq!((scene.max_depth, scene.camera.focus_distance), (UNBOUNDED_DEPTH, 1e4));
+    let depth =
+        |value: i64| format!("<integrator type=\"any\"><integer name=\"max_depth\" value=\"{value}\"/></integrator>");
+    assert_eq!(load(&depth(-1)).max_depth, UNBOUNDED_DEPTH);
+    assert_eq!(load(&depth(7)).max_depth, 7);
+    for (filter, expected) in [
+        ("<rfilter type=\"box\"/>", Filter::Box),
+        ("<rfilter type=\"tent\"/>", Filter::Tent),
+        (
+            "<rfilter type=\"gaussian\"><float name=\"stddev\" value=\"0.7\"/></rfilter>",
+            Filter::Gaussian { stddev: 0.7 },
+        ),
+    ] {
+        let film = format!("<film type=\"hdrfilm\"><integer name=\"width\" value=\"32\"/>{filter}</film>");
+        let sensor = format!("<sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/>{film}</sensor>");
+        let scene = load_bare(&sensor);
+        assert_eq!((scene.film.size, scene.film.filter), ([32, 576], expected));
+    }
+}
+
+/// Steps of a transformation apply in the order of the file.
+#[test]
+fn transformations_apply_in_order() {
+    let steps = "<scale value=\"0.5\"/><translate x=\"1\"/><rotate z=\"2\" angle=\"90\"/><translate z=\"3\"/>";
+    let scene = load(&format!("<shape type=\"sphere\"><transform name=\"to_world\">{steps}</transform></shape>"));
+    let ray = Ray { origin: DVec3::new(0.0, 1.0, 9.0), direction: -DVec3::Z, tmax: f64::INFINITY };
+    let position = scene.intersect(&ray).map(|surface| surface.position);
+    assert!(position.is_some_and(|p| (p - DVec3::new(0.0, 1.0, 3.5)).length() < 1e-12), "{position:?}");
+}
+
+/// The hash changes with everything that decides the image, meshes included.
+#[test]
+fn the_hash_covers_the_meshes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.xml");
+    let shape = "<shape type=\"obj\"><string name=\"filename\" value=\"a.obj\"/></shape>";
+    std::fs::write(&path, format!("<scene version=\"3.0.0\">{SENSOR}{shape}</scene>")).unwrap();
+    let hash = |mesh: &str| {
+        std::fs::write(folder.path().join("a.obj"), mesh).unwrap();
+        load::read(&path, &Options::default()).unwrap_or_else(|error| panic!("{error}")).scene.hash
+    };
+    let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    assert_eq!(hash(triangle), hash(triangle));
+    assert_ne!(hash(triangle), hash(&triangle.replace("1 0 0", "2 0 0")));
+}
