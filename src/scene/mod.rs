@@ -1,9 +1,11 @@
 //! The scene as flat arrays, and the questions that integrators ask of it.
 
 mod builder;
+mod caster;
 mod surface;
 
 pub use builder::{Builder, FilmSpec, Mesh, SceneError, Shine};
+pub use caster::Caster;
 pub use surface::Surface;
 
 use crate::bsdf::Bsdf;
@@ -55,28 +57,13 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// The closest surface along `ray`.
     #[inline]
-    pub fn intersect(&self, ray: &Ray) -> Option<Surface> {
+    fn intersect(&self, ray: &Ray) -> Option<Surface> {
         let hit = self.bvh.intersect(ray)?;
         Some(match hit.primitive {
             Primitive::Triangle { index, u, v } => self.triangle_surface(index as usize, u, v),
             Primitive::Solid { index } => self.solid_surface(index as usize, ray, hit.t),
         })
-    }
-
-    /// Whether nothing lies between the surface `from` and the point `to` (moved off its own surface by the caller).
-    #[inline]
-    pub fn visible(&self, from: DVec3, to: DVec3) -> bool {
-        let offset = to - from;
-        let distance = offset.length();
-        !self.bvh.occluded(&Ray { origin: from, direction: offset / distance, tmax: distance })
-    }
-
-    /// Whether the ray from `origin` along `direction` leaves the scene.
-    #[inline]
-    pub fn escapes(&self, origin: DVec3, direction: DVec3) -> bool {
-        !self.bvh.occluded(&Ray { origin, direction, tmax: f64::INFINITY })
     }
 
     fn triangle_surface(&self, index: usize, u: f64, v: f64) -> Surface {
