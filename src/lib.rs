@@ -1,15 +1,3 @@
-//! pathblend renders a scene with several light transport algorithms, learns from path features which blend of them
-//! errs least, and blends. `ARCHITECTURE.md` is the map of the rooms below.
+//! pathblend
 
-pub mod bsdf;
-pub mod camera;
-pub mod emitter;
-pub mod film;
 pub mod geometry;
-pub mod image;
-pub mod integrators;
-pub mod markov;
-pub mod math;
-pub mod paths;
-pub mod scene;
-pub mod spectrum;
