@@ -76,7 +76,7 @@ impl Image {
     /// Reads an OpenEXR file: by pathblend with all layers and the manifest, or by any other renderer.
     ///
     /// Half, float and unsigned samples become `f32`. The colour is the first part with top-level channels
-    /// `R`, `G`, `B`, else a layer that has them, else a lone `Y` as grey. Every other group of `R`, `G`,
+    /// `R`, `G`, `B`, else a layer named like the picture (`combined`, `beauty`, …), else a lone `Y` as grey. Every other group of `R`, `G`,
     /// `B` or `Y` becomes a layer; alpha and other channels are left out, and so are parts of another size.
     /// Colours are taken for linear Rec.709, whatever the file says about its primaries.
     ///

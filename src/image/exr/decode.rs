@@ -6,7 +6,7 @@ use std::io::Cursor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-use ::exr::block::chunk::Chunk;
+use ::exr::block::chunk::{Chunk, CompressedBlock};
 use ::exr::block::lines::LineRef;
 use ::exr::block::reader::{ChunksReader, Reader};
 use ::exr::block::{self, UncompressedBlock};
@@ -27,6 +27,10 @@ use super::{LAYERS_FILE, MANIFEST, RENDER_TIME, SAMPLES, Twin};
 const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 /// How many blocks are decompressed before their samples are taken out.
 const BLOCKS_AT_ONCE: usize = 32;
+/// How many numbers the head of a DWA block has, and by how much they may exceed twice the pixels' bytes: DCT
+/// blocks at the edge are padded to 8×8.
+const DWA_NUMBERS: usize = 11;
+const DWA_SLACK: u64 = 1 << 16;
 /// A block costs at least this many bytes: its place in the offset table, a coordinate and a size.
 const LEAST_BYTES_PER_BLOCK: u128 = 16;
 
@@ -237,8 +241,38 @@ fn empty_plane(header: &Header, group: &Group, file_bytes: usize) -> ExrResult<P
 }
 
 fn decompress(batch: Vec<Chunk>, meta: &MetaData) -> ExrResult<Vec<UncompressedBlock>> {
-    let decompress = |chunk| UncompressedBlock::decompress_chunk(chunk, meta, false);
+    let decompress = |chunk: Chunk| {
+        check_dwa(&chunk, meta)?;
+        UncompressedBlock::decompress_chunk(chunk, meta, false)
+    };
     batch.into_par_iter().map(decompress).collect()
+}
+
+/// Refuses a DWA block whose head asks for more memory than its pixels take. The head is eleven numbers of
+/// eight bytes, sizes and counts all but two small ones (OpenEXR, `internal_dwa_compressor.h`), and the `exr`
+/// crate (1.74) allocates what they say before it looks further.
+fn check_dwa(chunk: &Chunk, meta: &MetaData) -> ExrResult<()> {
+    let Some(header) = meta.headers.get(chunk.layer_index) else {
+        return Ok(()); // the decoder has its own error for this
+    };
+    let bytes = match &chunk.compressed_block {
+        CompressedBlock::ScanLine(block) => &block.compressed_pixels_le,
+        CompressedBlock::Tile(block) => &block.compressed_pixels_le,
+        _ => return Ok(()),
+    };
+    if !matches!(header.compression, Compression::DWAA(_) | Compression::DWAB(_)) {
+        return Ok(());
+    }
+    let place = header.get_block_data_indices(&chunk.compressed_block)?;
+    let place = header.get_absolute_block_pixel_coordinates(place)?;
+    let raw = place.size.area() * header.channels.bytes_per_pixel;
+    let mut numbers = bytes.as_chunks::<8>().0.iter().take(DWA_NUMBERS);
+    let limit = 2 * raw as u64 + DWA_SLACK;
+    // A block that did not shrink is stored as it is, without a head.
+    if bytes.len() != raw && numbers.any(|bytes| u64::from_le_bytes(*bytes) > limit) {
+        return Err(invalid("a block of pixels has an impossible size".to_owned()));
+    }
+    Ok(())
 }
 
 /// Takes the wanted channels out of a block.

@@ -10,7 +10,7 @@ use ::exr::meta::header::Header;
 use super::super::layers::is_name_char;
 
 /// Last words of layer names that mean the picture itself, by Blender and by custom.
-const BEAUTY_NAMES: [&str; 6] = ["combined", "beauty", "rgba", "rgb", "color", "colour"];
+const BEAUTY_NAMES: [&str; 8] = ["combined", "beauty", "rgba", "rgb", "color", "colour", "image", "main"];
 
 /// The channels of one layer of one part.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,7 +53,8 @@ fn all_groups(headers: &[Header]) -> Vec<Group> {
     (0..headers.len()).flat_map(|part| groups_of(part, &headers[part])).collect()
 }
 
-/// The picture's place among the groups: top-level colour, colour under a telling name, any colour, grey.
+/// The picture's place among the groups: top-level colour, else colour under a telling name, else grey. Any other
+/// colour may be albedo or variance: taking it for the picture would mislead.
 fn beauty_index(groups: &[Group], headers: &[Header]) -> Option<usize> {
     let find = |test: &dyn Fn(&Group) -> bool| groups.iter().position(test);
     let is_colour = |group: &Group| group.channels.len() == 3;
@@ -63,7 +64,6 @@ fn beauty_index(groups: &[Group], headers: &[Header]) -> Option<usize> {
     };
     find(&|g| g.top && is_colour(g))
         .or_else(|| find(&|g| is_colour(g) && says_beauty(g)))
-        .or_else(|| find(&is_colour))
         .or_else(|| find(&|g| g.top && !has_chroma(&headers[g.part])))
 }
 
