@@ -7,6 +7,7 @@
 mod decode;
 mod encode;
 mod groups;
+mod zip;
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};

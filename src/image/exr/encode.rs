@@ -3,6 +3,7 @@
 use std::io::BufWriter;
 use std::path::Path;
 
+use ::exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock};
 use ::exr::block::writer::ChunksWriter;
 use ::exr::block::{self, BlockIndex, UncompressedBlock, lines::LineRefMut};
 use ::exr::error::UnitResult;
@@ -16,7 +17,7 @@ use rayon::prelude::*;
 use serde_json::Value;
 
 use super::super::{Image, ImageError, Layer, whole::write_whole};
-use super::{LAYERS_FILE, MANIFEST, Precision, RENDER_TIME, SAMPLES, WriteOptions, layers_path};
+use super::{LAYERS_FILE, MANIFEST, Precision, RENDER_TIME, SAMPLES, WriteOptions, layers_path, zip};
 
 /// How many blocks are compressed before they are written: enough to keep all cores busy, few enough to
 /// hold in memory.
@@ -134,11 +135,11 @@ fn write_blocks(meta: &MetaData, writer: &mut impl ChunksWriter, channels: &[Cha
     for batch in blocks.chunks(BLOCKS_AT_ONCE) {
         let compress = |&(index, block): &(usize, BlockIndex)| {
             let list = &meta.headers[block.layer].channels;
-            let chunk = UncompressedBlock::from_lines(list, block, |line| fill(line, channels))
-                .compress_to_chunk(&meta.headers)?;
-            Ok((index, chunk))
+            let fill = |line: LineRefMut<'_>| fill(line, channels);
+            let samples = UncompressedBlock::collect_block_data_from_lines(list, block, fill);
+            (index, chunk(block, zip::compress(samples)))
         };
-        let chunks: Vec<_> = batch.par_iter().map(compress).collect::<::exr::error::Result<_>>()?;
+        let chunks: Vec<(usize, Chunk)> = batch.par_iter().map(compress).collect();
         for (index, chunk) in chunks {
             writer.write_chunk(index, chunk)?;
         }
@@ -146,17 +147,29 @@ fn write_blocks(meta: &MetaData, writer: &mut impl ChunksWriter, channels: &[Cha
     Ok(())
 }
 
-/// Copies one line of one channel into a block. Lines are whole rows, because the file is in scan lines.
+fn chunk(block: BlockIndex, compressed_pixels_le: Vec<u8>) -> Chunk {
+    Chunk {
+        layer_index: block.layer,
+        compressed_block: CompressedBlock::ScanLine(CompressedScanLineBlock {
+            // The file's window starts at zero and its height is an `i32`.
+            y_coordinate: block.pixel_position.y() as i32,
+            compressed_pixels_le,
+        }),
+    }
+}
+
+/// Copies one line of one channel into a block, as little-endian samples. Lines are whole rows, because the
+/// file is in scan lines.
 fn fill(line: LineRefMut<'_>, channels: &[Channel<'_>]) {
     let row = channels[line.location.channel].samples;
     let row = row.row(line.location.position.y());
     if line.value.len() == 4 * row.len() {
         for (bytes, sample) in line.value.chunks_exact_mut(4).zip(row) {
-            bytes.copy_from_slice(&sample.to_ne_bytes());
+            bytes.copy_from_slice(&sample.to_le_bytes());
         }
     } else {
         for (bytes, &sample) in line.value.chunks_exact_mut(2).zip(row) {
-            bytes.copy_from_slice(&to_half(sample).to_ne_bytes());
+            bytes.copy_from_slice(&to_half(sample).to_le_bytes());
         }
     }
 }
