@@ -1,3 +1,3 @@
 //! pathblend
 
-pub mod geometry;
+pub mod image;
