@@ -1,1 +1,3 @@
 //! pathblend
+
+pub mod forest;
