@@ -1,3 +1,3 @@
 //! pathblend
 
-pub mod image;
+pub mod forest;
