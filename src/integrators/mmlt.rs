@@ -288,7 +288,7 @@ impl Lane {
         };
         splat(&chain.current, 1.0 - acceptance);
         let accepted = chain.stream.number() < acceptance;
-        let mut tally = |kind: &mut Acceptance| {
+        let tally = |kind: &mut Acceptance| {
             kind.proposed += 1;
             kind.accepted += u64::from(accepted);
         };

@@ -4,6 +4,7 @@ use super::rows::Rows;
 use super::subpath::{Subpath, Vertex, VertexKind};
 use crate::emitter::{Emitter, Start};
 use crate::film::Word;
+use crate::geometry::offset::OFFSET;
 use crate::math::{AreaPdf, Row, SolidAnglePdf, Walk};
 use crate::scene::{Caster, EmitterId, Surface};
 use crate::spectrum::Spectrum;
@@ -92,7 +93,7 @@ pub fn light_vertex(scene: &Caster<'_>, row: Row) -> Option<Vertex> {
 /// Distance by which rays are started off a light at `position`.
 #[inline]
 pub(super) fn light_offset(position: DVec3) -> f64 {
-    4e-12 * position.abs().max_element()
+    4.0 * OFFSET * position.abs().max_element()
 }
 
 /// The end of a walk that goes on.

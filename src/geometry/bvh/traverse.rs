@@ -128,7 +128,13 @@ impl Bvh {
 
 /// Puts the entered children on the stack, the nearest on top; gives the new top.
 #[inline(always)]
-fn push<const N: usize>(stack: &mut [u64; N], top: usize, mut mask: u32, enter: &[f32; 8], children: &[Child; 8]) -> usize {
+fn push<const N: usize>(
+    stack: &mut [u64; N],
+    top: usize,
+    mut mask: u32,
+    enter: &[f32; 8],
+    children: &[Child; 8],
+) -> usize {
     let mut end = top;
     while mask != 0 {
         let lane = mask.trailing_zeros() as usize & 7;
