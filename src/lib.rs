@@ -1,3 +1,4 @@
 //! pathblend
 
+pub mod blend;
 pub mod forest;
