@@ -44,7 +44,7 @@ fn what_is_saved_is_what_is_loaded() {
 
 #[test]
 fn a_full_model_fits_in_100_kilobytes() {
-    let (_, model) = model(60_000, &Settings { min_rows: 2, min_weight: 0.0, ..Settings::default() });
+    let (_, model) = model(60_000, &Settings { max_depth: 60, min_rows: 2, min_weight: 0.0, ..Settings::default() });
     assert!(model.forest.trees().iter().all(|t| t.leaves() == 700));
     let bytes = model.to_json(Path::new("m")).unwrap().len();
     println!("5 trees of 700 leaves over 100 features: {bytes} bytes");

@@ -8,6 +8,7 @@ mod binned;
 mod error;
 mod file;
 mod grow;
+mod lanes;
 mod linear;
 mod quality;
 mod refine;
@@ -17,6 +18,7 @@ mod tree;
 
 pub use error::ForestError;
 pub use file::{FORMAT, MAX_FILE_BYTES, Model, VERSION};
+pub(crate) use lanes::Lanes;
 pub use linear::Linear;
 pub use quality::Quality;
 pub use rows::{MAX_FEATURES, Rows, SplitBy};

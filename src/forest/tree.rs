@@ -112,15 +112,4 @@ impl Forest {
         };
         (0..rows.len()).into_par_iter().map(one).collect()
     }
-
-    /// Predictions for many points at once, the fast path for images.
-    ///
-    /// `values` holds one plane per feature that the planes list names: feature f of point i stands at
-    /// `values[planes[f] * stride + i]`, 0 ≤ i < `out.len()` ≤ `stride`; a feature without a plane (`None`) is 0.
-    /// Several points walk down a tree side by side, because each step waits for memory.
-    pub fn predict_planes(&self, values: &[f32], planes: &[Option<usize>], stride: usize, out: &mut [f32]) {
-        for (i, out) in out.iter_mut().enumerate() {
-            *out = self.predict_with(|f| planes[usize::from(f)].map_or(0.0, |p| values[p * stride + i]));
-        }
-    }
 }
