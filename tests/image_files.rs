@@ -27,8 +27,10 @@ fn sample(width: usize, height: usize) -> Image {
     image
 }
 
-/// Bit patterns, so that NaN equals itself.
-fn bits(image: &Image) -> (Vec<u32>, Vec<(String, Vec<usize>, Vec<u32>)>) {
+/// Bit patterns, so that NaN equals itself: of the colour, and of each layer with its shape.
+type Bits = (Vec<u32>, Vec<(String, Vec<usize>, Vec<u32>)>);
+
+fn bits(image: &Image) -> Bits {
     let of = |samples: &mut dyn Iterator<Item = &f32>| samples.map(|s| s.to_bits()).collect();
     let layer = |(name, layer): (&String, &Layer)| {
         let samples = match layer {
@@ -203,6 +205,33 @@ fn foreign_files_of_every_kind_are_read() {
     }
 }
 
+/// Two parts as some renderers write them: depth first, then the picture; and one part of grey alone.
+#[test]
+fn pictures_are_found_among_parts_and_in_grey() {
+    use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, LayerAttributes, WritableImage};
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("parts.exr");
+    let part = |name: &str, channels: &[(&str, f32)]| {
+        let list = channels.iter().map(|&(name, value)| AnyChannel::new(name, FlatSamples::F32(vec![value; 6])));
+        let channels = AnyChannels::sort(list.collect());
+        let name = LayerAttributes::named(name);
+        exr::prelude::Layer::new((3, 2), name, Encoding::UNCOMPRESSED, channels)
+    };
+    let depth = part("depth", &[("Z", 9.0)]);
+    let picture = part("picture", &[("R", 1.0), ("G", 2.0), ("B", 3.0)]);
+    let albedo = part("albedo", &[("R", 0.1), ("G", 0.2), ("B", 0.3), ("extra.Y", 7.0)]);
+    let window = exr::prelude::ImageAttributes::with_size((3, 2));
+    let file = exr::prelude::Image::from_layers(window, vec![depth, picture, albedo]);
+    file.write().to_file(&path).unwrap();
+    let found = Image::read(&path).unwrap();
+    assert_eq!(found.colour, Array3::from_shape_fn((2, 3, 3), |(_, _, c)| c as f32 + 1.0));
+    assert_eq!(found.layers.keys().collect::<Vec<_>>(), ["albedo", "extra"]);
+    assert_eq!(found.layers["extra"], Layer::Luminance(Array2::from_elem((2, 3), 7.0)));
+    let grey = part("grey", &[("A", 1.0), ("Y", 0.5)]);
+    exr::prelude::Image::from_layer(grey).write().to_file(&path).unwrap();
+    assert_eq!(Image::read(&path).unwrap().colour, Array3::from_elem((2, 3, 3), 0.5));
+}
+
 #[test]
 fn every_truncation_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
@@ -220,7 +249,7 @@ fn every_truncation_is_an_error() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..Default::default() })]
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..Default::default() })]
 
     #[test]
     fn flipped_bytes_never_panic(

@@ -7,6 +7,8 @@
 mod decode;
 mod encode;
 mod groups;
+mod guard;
+mod planes;
 mod zip;
 
 use std::ffi::OsString;

@@ -76,9 +76,10 @@ impl Image {
     /// Reads an OpenEXR file: by pathblend with all layers and the manifest, or by any other renderer.
     ///
     /// Half, float and unsigned samples become `f32`. The colour is the first part with top-level channels
-    /// `R`, `G`, `B`, else a layer named like the picture (`combined`, `beauty`, …), else a lone `Y` as grey. Every other group of `R`, `G`,
-    /// `B` or `Y` becomes a layer; alpha and other channels are left out, and so are parts of another size.
-    /// Colours are taken for linear Rec.709, whatever the file says about its primaries.
+    /// `R`, `G`, `B`, else a layer named like the picture (`combined`, `beauty`, …), else a lone `Y` as grey.
+    /// Every other group of `R`, `G`, `B` or `Y` becomes a layer, under a name made proper where it must be;
+    /// alpha and other channels are left out, and so are parts of another size. Colours are taken for linear
+    /// Rec.709, whatever the file says about its primaries.
     ///
     /// # Errors
     /// A file that is missing, not OpenEXR, damaged, unsupported or without colour: see [`ImageError`].

@@ -4,7 +4,8 @@ use ndarray::ArrayView3;
 
 /// The sRGB code value in [0, 1] of a linear value; values outside [0, 1] are clamped and NaN becomes 0.
 pub fn encode(linear: f32) -> f32 {
-    let clamped = linear.max(0.0).min(1.0); // `max` first: it also turns NaN into 0
+    // `max` gives 0 for NaN, where `clamp` alone would keep it.
+    let clamped = linear.max(0.0).clamp(0.0, 1.0);
     if clamped <= 0.003_130_8 { 12.92 * clamped } else { 1.055 * clamped.powf(1.0 / 2.4) - 0.055 }
 }
 

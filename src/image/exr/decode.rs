@@ -1,43 +1,29 @@
 //! Reading OpenEXR, by whomever it was written, whatever has happened to it since.
 
-use std::collections::HashSet;
 use std::fs;
 use std::io::Cursor;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-use ::exr::block::chunk::{Chunk, CompressedBlock};
-use ::exr::block::lines::LineRef;
-use ::exr::block::reader::{ChunksReader, Reader};
-use ::exr::block::{self, UncompressedBlock};
-use ::exr::error::{Error, Result as ExrResult};
-use ::exr::meta::MetaData;
-use ::exr::meta::attribute::{AttributeValue, SampleType, Text};
+use ::exr::block;
+use ::exr::block::reader::Reader;
+use ::exr::error::Error;
+use ::exr::meta::attribute::{AttributeValue, Text};
 use ::exr::meta::header::Header;
-use ::exr::prelude::Compression;
-use half::f16;
-use ndarray::{Array2, Array3};
-use rayon::prelude::*;
+use ndarray::Array3;
 use serde_json::{Map, Value};
 
 use super::super::{Image, ImageError, Layer};
-use super::groups::{self, Group};
+use super::groups;
+use super::guard::{check_promise, guarded};
+use super::planes::read_planes;
 use super::{LAYERS_FILE, MANIFEST, RENDER_TIME, SAMPLES, Twin};
 
 const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
-/// How many blocks are decompressed before their samples are taken out.
-const BLOCKS_AT_ONCE: usize = 32;
-/// How many numbers the head of a DWA block has, and by how much they may exceed twice the pixels' bytes: DCT
-/// blocks at the edge are padded to 8×8.
-const DWA_NUMBERS: usize = 11;
-const DWA_SLACK: u64 = 1 << 16;
-/// A block costs at least this many bytes: its place in the offset table, a coordinate and a size.
-const LEAST_BYTES_PER_BLOCK: u128 = 16;
-
 /// See [`Image::read`].
 pub(in super::super) fn read(path: &Path) -> Result<Image, ImageError> {
     let bytes = load(path)?;
-    guarded(path, || read_picture(path, &bytes))
+    let picture = guarded(|| read_picture(path, &bytes));
+    picture.unwrap_or_else(|| Err(damaged(path, "its contents contradict each other".to_owned())))
 }
 
 fn load(path: &Path) -> Result<Vec<u8>, ImageError> {
@@ -48,16 +34,6 @@ fn load(path: &Path) -> Result<Vec<u8>, ImageError> {
     let first: Vec<String> = bytes.iter().take(4).map(|b| format!("{b:02x}")).collect();
     let found = if first.is_empty() { "an empty file".to_owned() } else { first.join(" ") };
     Err(ImageError::NotExr { path: path.to_owned(), found })
-}
-
-/// Runs a decoder on bytes that may be anything. The `exr` crate (1.74) answers some damaged files with a
-/// failed assertion or an index out of bounds instead of an error (PIZ blocks, tile sizes of zero), and there
-/// is no way to see all of them coming without writing the decoder again. Nothing outlives the unwinding: the
-/// closure only borrows the bytes. What would abort instead of unwinding, an impossible allocation, is ruled
-/// out by [`check_promise`].
-fn guarded<T>(path: &Path, decode: impl FnOnce() -> Result<T, ImageError>) -> Result<T, ImageError> {
-    catch_unwind(AssertUnwindSafe(decode))
-        .unwrap_or_else(|_| Err(damaged(path, "its contents contradict each other".to_owned())))
 }
 
 fn damaged(path: &Path, reason: String) -> ImageError {
@@ -114,201 +90,12 @@ fn open<'a>(path: &Path, bytes: &'a [u8]) -> Result<Reader<Cursor<&'a [u8]>>, Im
     Ok(reader)
 }
 
-/// Refuses a header that promises more pixels or blocks than the file's bytes can hold: believing it would
-/// mean to ask for terabytes of memory, which ends the process.
-fn check_promise(header: &Header, file_bytes: usize) -> Result<(), String> {
-    let (width, height) = (header.layer_size.width(), header.layer_size.height());
-    if width == 0 || height == 0 {
-        return Err("it has no pixels".to_owned());
-    }
-    let file_bytes = file_bytes as u128;
-    let bytes = width as u128 * height as u128 * header.channels.bytes_per_pixel as u128;
-    let blocks = header.chunk_count as u128;
-    if bytes > file_bytes * best_ratio(header.compression) || blocks * LEAST_BYTES_PER_BLOCK > file_bytes {
-        let channels = header.channels.list.len();
-        return Err(format!(
-            "it promises {width}x{height} pixels with {channels} channels, \
-             more than its {file_bytes} bytes can hold"
-        ));
-    }
-    Ok(())
-}
-
-/// An upper bound of how many bytes of pixels one byte of a file can stand for.
-fn best_ratio(compression: Compression) -> u128 {
-    match compression {
-        Compression::Uncompressed => 1,
-        // A pair of bytes stands for a run of at most 128.
-        Compression::RLE => 64,
-        // Deflate reaches 1032; PXR24 also drops a byte of four. Runs in PIZ reach 255 samples in 9 bits.
-        Compression::ZIP1 | Compression::ZIP16 | Compression::PXR24 | Compression::PIZ => 2048,
-        Compression::B44 | Compression::B44A => 16,
-        // Deflate over one number for a block of 64 samples.
-        _ => 1 << 17,
-    }
-}
-
 fn list_channels(headers: &[Header]) -> String {
     let channels = headers.iter().flat_map(|header| header.channels.list.iter());
     let names: Vec<String> = channels.map(|channel| channel.name.to_string()).collect();
     match names.len() {
         0..=12 => names.join(", "),
         more => format!("{} and {} more", names[..10].join(", "), more - 10),
-    }
-}
-
-/// The samples of one group while they are collected: pixels in rows, `step` numbers each.
-struct Plane {
-    step: usize,
-    samples: Vec<f32>,
-}
-
-impl Plane {
-    fn into_layer(self, (height, width): (usize, usize)) -> Option<Layer> {
-        if self.step == 1 {
-            let samples = Array2::from_shape_vec((height, width), self.samples);
-            samples.ok().map(Layer::Luminance)
-        } else {
-            let samples = Array3::from_shape_vec((height, width, 3), self.samples);
-            samples.ok().map(Layer::Colour)
-        }
-    }
-}
-
-/// Where the samples of one channel go.
-#[derive(Clone, Copy)]
-struct Slot {
-    plane: usize,
-    component: usize,
-}
-
-/// Reads the samples of all `groups`, which must be of one size, in their order.
-fn read_planes(reader: Reader<Cursor<&[u8]>>, groups: &[Group], file_bytes: usize) -> ExrResult<Vec<Plane>> {
-    let meta = reader.meta_data().clone();
-    let slots = slots(&meta.headers, groups);
-    let wanted: HashSet<usize> = groups.iter().map(|group| group.part).collect();
-    let mut planes = groups
-        .iter()
-        .map(|group| empty_plane(&meta.headers[group.part], group, file_bytes))
-        .collect::<ExrResult<Vec<_>>>()?;
-    let mut chunks = reader
-        .filter_chunks(false, |_, tile, block| wanted.contains(&block.layer) && tile.is_largest_resolution_level())?;
-    let expected = chunks.expected_chunk_count();
-    let mut seen = HashSet::with_capacity(expected);
-    loop {
-        let batch: Vec<Chunk> = chunks.by_ref().take(BLOCKS_AT_ONCE).collect::<ExrResult<_>>()?;
-        if batch.is_empty() {
-            break;
-        }
-        for block in decompress(batch, &meta)? {
-            seen.insert((block.index.layer, block.index.level, block.index.pixel_position));
-            store(&block, &meta, &slots, &mut planes)?;
-        }
-    }
-    // A damaged offset table sends the reader to the same block twice, and another stays black.
-    if seen.len() == expected {
-        return Ok(planes);
-    }
-    let missing = expected - seen.len();
-    Err(invalid(format!("{missing} of {expected} blocks of pixels are missing")))
-}
-
-fn invalid(reason: String) -> Error {
-    Error::Invalid(reason.into())
-}
-
-/// For each part and channel, where its samples go, if anywhere.
-fn slots(headers: &[Header], groups: &[Group]) -> Vec<Vec<Option<Slot>>> {
-    let none = |header: &Header| vec![None; header.channels.list.len()];
-    let mut slots: Vec<Vec<Option<Slot>>> = headers.iter().map(none).collect();
-    for (plane, group) in groups.iter().enumerate() {
-        for (component, &channel) in group.channels.iter().enumerate() {
-            slots[group.part][channel] = Some(Slot { plane, component });
-        }
-    }
-    slots
-}
-
-fn empty_plane(header: &Header, group: &Group, file_bytes: usize) -> ExrResult<Plane> {
-    let step = group.channels.len();
-    let length = header.layer_size.area() * step;
-    let mut samples = Vec::new();
-    samples
-        .try_reserve_exact(length)
-        .map_err(|_| invalid(format!("no memory for {length} samples of a file of {file_bytes} bytes")))?;
-    samples.resize(length, 0.0);
-    Ok(Plane { step, samples })
-}
-
-fn decompress(batch: Vec<Chunk>, meta: &MetaData) -> ExrResult<Vec<UncompressedBlock>> {
-    let decompress = |chunk: Chunk| {
-        check_dwa(&chunk, meta)?;
-        UncompressedBlock::decompress_chunk(chunk, meta, false)
-    };
-    batch.into_par_iter().map(decompress).collect()
-}
-
-/// Refuses a DWA block whose head asks for more memory than its pixels take. The head is eleven numbers of
-/// eight bytes, sizes and counts all but two small ones (OpenEXR, `internal_dwa_compressor.h`), and the `exr`
-/// crate (1.74) allocates what they say before it looks further.
-fn check_dwa(chunk: &Chunk, meta: &MetaData) -> ExrResult<()> {
-    let Some(header) = meta.headers.get(chunk.layer_index) else {
-        return Ok(()); // the decoder has its own error for this
-    };
-    let bytes = match &chunk.compressed_block {
-        CompressedBlock::ScanLine(block) => &block.compressed_pixels_le,
-        CompressedBlock::Tile(block) => &block.compressed_pixels_le,
-        _ => return Ok(()),
-    };
-    if !matches!(header.compression, Compression::DWAA(_) | Compression::DWAB(_)) {
-        return Ok(());
-    }
-    let place = header.get_block_data_indices(&chunk.compressed_block)?;
-    let place = header.get_absolute_block_pixel_coordinates(place)?;
-    let raw = place.size.area() * header.channels.bytes_per_pixel;
-    let mut numbers = bytes.as_chunks::<8>().0.iter().take(DWA_NUMBERS);
-    let limit = 2 * raw as u64 + DWA_SLACK;
-    // A block that did not shrink is stored as it is, without a head.
-    if bytes.len() != raw && numbers.any(|bytes| u64::from_le_bytes(*bytes) > limit) {
-        return Err(invalid("a block of pixels has an impossible size".to_owned()));
-    }
-    Ok(())
-}
-
-/// Takes the wanted channels out of a block.
-fn store(
-    block: &UncompressedBlock,
-    meta: &MetaData,
-    slots: &[Vec<Option<Slot>>],
-    planes: &mut [Plane],
-) -> ExrResult<()> {
-    let stray = || invalid("a block of pixels lies outside the image".to_owned());
-    let header = meta.headers.get(block.index.layer).ok_or_else(stray)?;
-    if block.index.level != ::exr::math::Vec2(0, 0) {
-        return Err(stray());
-    }
-    for line in block.lines(&header.channels) {
-        let location = line.location;
-        let Some(slot) = slots[location.layer][location.channel] else {
-            continue;
-        };
-        let plane = &mut planes[slot.plane];
-        let start = location.position.y() * header.layer_size.width() + location.position.x();
-        let pixels = start * plane.step..(start + location.sample_count) * plane.step;
-        let target = plane.samples.get_mut(pixels).ok_or_else(stray)?;
-        let target = target.iter_mut().skip(slot.component).step_by(plane.step);
-        copy_line(line, header.channels.list[location.channel].sample_type, target);
-    }
-    Ok(())
-}
-
-/// Converts the samples of a line to `f32`: exactly from halves, rounded from unsigned integers.
-fn copy_line<'a>(line: LineRef<'_>, kind: SampleType, target: impl Iterator<Item = &'a mut f32>) {
-    let (words, halves) = (line.value.as_chunks::<4>().0, line.value.as_chunks::<2>().0);
-    match kind {
-        SampleType::F32 => target.zip(words).for_each(|(t, b)| *t = f32::from_ne_bytes(*b)),
-        SampleType::U32 => target.zip(words).for_each(|(t, b)| *t = u32::from_ne_bytes(*b) as f32),
-        SampleType::F16 => target.zip(halves).for_each(|(t, b)| *t = f16::from_ne_bytes(*b).to_f32()),
     }
 }
 

@@ -12,6 +12,9 @@ use super::super::layers::is_name_char;
 /// Last words of layer names that mean the picture itself, by Blender and by custom.
 const BEAUTY_NAMES: [&str; 8] = ["combined", "beauty", "rgba", "rgb", "color", "colour", "image", "main"];
 
+/// Beside these, `Y` is a coordinate (of a normal, say), or luminance whose chroma lies elsewhere.
+const NOT_GREY: [&str; 3] = ["X", "RY", "BY"];
+
 /// The channels of one layer of one part.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Group {
@@ -38,7 +41,7 @@ pub(super) struct Selection {
 /// half of a split image) is asked for with [`all_layers`].
 pub(super) fn select(headers: &[Header]) -> Option<Selection> {
     let mut groups = all_groups(headers);
-    let beauty = groups.remove(beauty_index(&groups, headers)?);
+    let beauty = groups.remove(beauty_index(&groups)?);
     let size = headers[beauty.part].layer_size;
     groups.retain(|group| headers[group.part].layer_size == size);
     Some(Selection { beauty, layers: named(groups) })
@@ -55,22 +58,14 @@ fn all_groups(headers: &[Header]) -> Vec<Group> {
 
 /// The picture's place among the groups: top-level colour, else colour under a telling name, else grey. Any other
 /// colour may be albedo or variance: taking it for the picture would mislead.
-fn beauty_index(groups: &[Group], headers: &[Header]) -> Option<usize> {
+fn beauty_index(groups: &[Group]) -> Option<usize> {
     let find = |test: &dyn Fn(&Group) -> bool| groups.iter().position(test);
     let is_colour = |group: &Group| group.channels.len() == 3;
     let says_beauty = |group: &Group| {
         let last = group.name.rsplit('.').next().unwrap_or_default();
         BEAUTY_NAMES.contains(&last.to_ascii_lowercase().as_str())
     };
-    find(&|g| g.top && is_colour(g))
-        .or_else(|| find(&|g| is_colour(g) && says_beauty(g)))
-        .or_else(|| find(&|g| g.top && !has_chroma(&headers[g.part])))
-}
-
-/// Whether `Y` is only the luminance of a picture whose chroma lies in `RY` and `BY`.
-fn has_chroma(header: &Header) -> bool {
-    let mut channels = header.channels.list.iter();
-    channels.any(|channel| ["RY", "BY"].iter().any(|name| channel.name.eq(name)))
+    find(&|g| g.top && is_colour(g)).or_else(|| find(&|g| is_colour(g) && says_beauty(g))).or_else(|| find(&|g| g.top))
 }
 
 fn groups_of(part: usize, header: &Header) -> Vec<Group> {
@@ -86,7 +81,9 @@ fn groups_of(part: usize, header: &Header) -> Vec<Group> {
     let group = |(layer, letters): (String, BTreeMap<String, usize>)| {
         let index = |letter| letters.get(letter).copied();
         let colour = || Some(vec![index("R")?, index("G")?, index("B")?]);
-        let channels = colour().or_else(|| Some(vec![index("Y")?]))?;
+        let is_grey = !NOT_GREY.iter().any(|letter| letters.contains_key(*letter));
+        let grey = || is_grey.then(|| index("Y")).flatten().map(|y| vec![y]);
+        let channels = colour().or_else(grey)?;
         let top = layer.is_empty();
         let name = if top { part_name.clone() } else { layer };
         Some(Group { part, name, top, channels })
@@ -173,5 +170,7 @@ mod tests {
         assert_eq!(grey.beauty.channels, [1]);
         assert!(select(&[part("", (1, 1), &["BY", "RY", "Y"])]).is_none());
         assert!(select(&[part("", (1, 1), &["Z", "w.Y"])]).is_none());
+        let normals = ["B", "G", "R", "n.X", "n.Y", "n.Z", "p.Y"];
+        assert_eq!(names(&select(&[part("", (1, 1), &normals)]).unwrap()), ["p"]);
     }
 }
