@@ -9,6 +9,7 @@ use obvhs::ploc::PlocBuilder;
 
 use super::collapse::{Primitives, collapse};
 use super::frame::Frame;
+use super::groups::Groups;
 use super::{Bvh, Dropped};
 use crate::geometry::offset::cross;
 use crate::geometry::{Bounds, Solid};
@@ -44,8 +45,9 @@ pub fn build(vertices: &[Vec3], triangles: &[[u32; 3]], solids: &[Solid]) -> Bvh
     let mut boxes: Vec<Aabb> = local.iter().map(|(_, corners)| triangle_box(corners)).collect();
     boxes.extend(kept_solids.iter().map(|id| solid_box(&solids[*id as usize], &frame)));
 
-    let tree = binary(&boxes);
-    let wide = collapse(&tree, &Primitives { boxes: &boxes, triangles: &local, solids: &kept_solids });
+    let groups = Groups::of_equal(&boxes);
+    let tree = binary(&groups.firsts().map(|first| boxes[first as usize]).collect::<Vec<_>>());
+    let wide = collapse(&tree, &Primitives { boxes: &boxes, groups: &groups, triangles: &local, solids: &kept_solids });
     Bvh {
         frame,
         bounds,

@@ -1,4 +1,4 @@
-//! From a binary hierarchy with one primitive per leaf to wide nodes and packets, at the least expected cost.
+//! From a binary hierarchy with one group of primitives per leaf to wide nodes and packets, at the least expected cost.
 //!
 //! Source: Ylitie, Karras, Laine 2017, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs",
 //! section 3.1: dynamic programming over the surface area heuristic, C(n, i) being the least cost of the subtree n as a
@@ -8,12 +8,13 @@ use glam::Vec3;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 
+use super::groups::Groups;
 use super::packet::Packet;
 use super::traverse::MAX_DEPTH;
 use super::wide::{Child, Node};
 
 /// Cost of testing a packet of triangles or a solid, relative to a wide node.
-const LEAF_COST: f32 = 1.2;
+const LEAF_COST: f32 = 1.8;
 /// Below this level chains (many equal boxes) are cut and their primitives spread evenly: eleven more levels of eight
 /// children hold more primitives than a `u32` can name.
 const PLANNED_DEPTH: usize = MAX_DEPTH - 11;
@@ -22,10 +23,19 @@ const PLANNED_DEPTH: usize = MAX_DEPTH - 11;
 pub struct Primitives<'a> {
     /// One box per primitive, in local units.
     pub boxes: &'a [Aabb],
+    /// What the leaves of the binary hierarchy stand for.
+    pub groups: &'a Groups,
     /// The caller's index and the corners in local units.
     pub triangles: &'a [(u32, [Vec3; 3])],
     /// The caller's index.
     pub solids: &'a [u32],
+}
+
+impl Primitives<'_> {
+    /// True if there is no solid among them.
+    fn all_triangles(&self, list: &[u32]) -> bool {
+        list.iter().all(|i| (*i as usize) < self.triangles.len())
+    }
 }
 
 /// The result; the root is the first node.
@@ -75,8 +85,8 @@ fn plan(tree: &Bvh2, primitives: &Primitives<'_>) -> Vec<Plan> {
         let node = &tree.nodes[index];
         let leaf_cost = LEAF_COST * node.aabb().half_area();
         plans[index] = if node.is_leaf() {
-            let primitive = tree.primitive_indices[node.first_index as usize] as usize;
-            let triangles = if primitive < primitives.triangles.len() { 1 } else { 9 };
+            let group = primitives.groups.members(tree.primitive_indices[node.first_index as usize]);
+            let triangles = if primitives.all_triangles(group) { group.len() as u32 } else { 9 };
             Plan { cost: [leaf_cost; 7], split: [0; 8], triangles }
         } else {
             let first = node.first_index as usize;
@@ -169,9 +179,7 @@ impl Emitter<'_> {
         let (child, bounds) = match root {
             Root::Subtree(index) => {
                 let bounds = *self.tree.nodes[*index].aabb();
-                let child = if self.plans[*index].split[0] == 0 {
-                    self.leaf(&self.below(*index))
-                } else if level < PLANNED_DEPTH {
+                let child = if self.plans[*index].split[0] == 1 && level < PLANNED_DEPTH {
                     self.node(&self.forest(*index), level + 1)
                 } else {
                     self.spread(&self.below(*index), level)
@@ -193,7 +201,7 @@ impl Emitter<'_> {
         while let Some(node) = open.pop().map(|i| &self.tree.nodes[i]) {
             let first = node.first_index as usize;
             if node.is_leaf() {
-                found.push(self.tree.primitive_indices[first]);
+                found.extend(self.primitives.groups.members(self.tree.primitive_indices[first]));
             } else {
                 open.extend([first + 1, first]);
             }
@@ -212,10 +220,9 @@ impl Emitter<'_> {
         Child::packet(self.wide.packets.len() - 1)
     }
 
-    /// A balanced subtree, whatever the boxes.
+    /// A leaf if it fits into one; else a balanced subtree, whatever the boxes.
     fn spread(&mut self, list: &[u32], level: usize) -> Child {
-        let only_triangles = list.iter().all(|i| (*i as usize) < self.primitives.triangles.len());
-        if list.len() == 1 || (only_triangles && list.len() <= 8) {
+        if list.len() == 1 || (list.len() <= 8 && self.primitives.all_triangles(list)) {
             return self.leaf(list);
         }
         let parts: Vec<Root> = list.chunks(list.len().div_ceil(8)).map(|part| Root::List(part.to_vec())).collect();

@@ -1,6 +1,6 @@
 //! A bounding volume hierarchy, eight children wide, over packets of up to eight triangles and analytic solids.
 //!
-//! The walk: [`build`] drops what cannot be hit and lets obvhs build a binary hierarchy, [`collapse`] turns it into wide
+//! The walk: [`build`] drops what cannot be hit, puts equal boxes together ([`groups`]) and lets obvhs build a binary hierarchy, [`collapse`] turns it into wide
 //! nodes ([`wide`]) and packets ([`packet`]), [`traverse`] carries a ray's constants ([`query`]) through them.
 //!
 //! All of it works in the hierarchy's own [`frame`]: relative to a centre, scaled by a power of two, both chosen so that
@@ -9,6 +9,7 @@
 mod build;
 mod collapse;
 mod frame;
+mod groups;
 mod packet;
 mod query;
 mod traverse;
@@ -19,7 +20,6 @@ use glam::Vec3;
 use super::{Bounds, Hit, Ray, Solid};
 use frame::Frame;
 use packet::Packet;
-use query::Query;
 use wide::Node;
 
 /// Triangles and solids that a hierarchy left out.
@@ -55,17 +55,15 @@ impl Bvh {
 
     /// The closest hit with `0 < t < tmax`.
     #[must_use]
-    #[inline]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        let query = Query::new(ray, &self.frame)?;
-        self.closest(&query, ray)
+        let best = self.dispatch::<false>(ray)?;
+        best.primitive.map(|primitive| Hit { t: best.t * self.frame.inverse, primitive })
     }
 
     /// Whether anything lies at `0 < t < tmax`: the same answer as `intersect(ray).is_some()`, sooner.
     #[must_use]
-    #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
-        Query::new(ray, &self.frame).is_some_and(|query| self.any(&query, ray))
+        self.dispatch::<true>(ray).is_some_and(|best| best.primitive.is_some())
     }
 
     /// The box around all that was not dropped; empty for an empty scene.

@@ -63,13 +63,16 @@ impl Packet {
         let edge_error = 12.0 * delta * (self.edge + delta);
         let volume_error = f32x8::splat(edge_error * (6.0 * self.edge + 16.0 * delta));
         let [sx, sy, sz] = query.shear32;
+        let [sx, sy, sz] = [f32x8::splat(sx), f32x8::splat(sy), f32x8::splat(sz)];
         let [ox, oy, oz] = query.origin32;
+        let [ox, oy, oz] = [f32x8::splat(ox), f32x8::splat(oy), f32x8::splat(oz)];
         let [kx, ky, kz] = query.axes;
         let sheared = |v: &[f32x8; 3]| {
             let (x, y, z) = (v[kx], v[ky], v[kz]);
             (z.mul_neg_add(sx, x) - ox, z.mul_neg_add(sy, y) - oy, (z - oz) * sz)
         };
-        let [(ax, ay, az), (bx, by, bz), (cx, cy, cz)] = self.vertices.each_ref().map(sheared);
+        let [a, b, c] = &self.vertices;
+        let ((ax, ay, az), (bx, by, bz), (cx, cy, cz)) = (sheared(a), sheared(b), sheared(c));
         let u = cx.mul_sub(by, cy * bx);
         let v = ax.mul_sub(cy, ay * cx);
         let w = bx.mul_sub(ay, by * ax);
@@ -91,11 +94,11 @@ impl Packet {
     /// next to the surface (see [`crate::geometry::offset`]).
     #[inline(always)]
     pub fn refine(&self, lane: usize, query: &Query, limit: f64) -> Option<Refined> {
-        let relative = self.vertices.each_ref().map(|v| {
-            let at = |i: usize| f64::from(v[query.axes[i]].as_array()[lane & 7]) - query.origin[i];
-            [at(0), at(1), at(2)]
-        });
-        let [a, b, c] = relative.map(|r| [r[0] - query.shear[0] * r[2], r[1] - query.shear[1] * r[2]]);
+        let corners = self.corners(lane, query);
+        let relative = |p: [f64; 3]| minus(p, query.origin);
+        let [ra, rb, rc] = [relative(corners[0]), relative(corners[1]), relative(corners[2])];
+        let sheared = |r: [f64; 3]| [r[0] - query.shear[0] * r[2], r[1] - query.shear[1] * r[2]];
+        let [a, b, c] = [sheared(ra), sheared(rb), sheared(rc)];
         let u = c[0] * b[1] - c[1] * b[0];
         let v = a[0] * c[1] - a[1] * c[0];
         let w = b[0] * a[1] - b[1] * a[0];
@@ -106,24 +109,52 @@ impl Packet {
         if determinant == 0.0 {
             return None;
         }
-        let t = self.plane_distance(lane, query, &relative);
-        (t > 0.0 && t < limit).then(|| {
-            let inverse = 1.0 / determinant;
-            Refined { t, u: v * inverse, v: w * inverse }
-        })
+        let z = [ra[2] * query.shear[2], rb[2] * query.shear[2], rc[2] * query.shear[2]];
+        let t = plane_distance(corners, ra, query.direction, z, limit)?;
+        let inverse = 1.0 / determinant;
+        Some(Refined { t, u: v * inverse, v: w * inverse })
     }
 
-    /// Distance to the plane, kept within the triangle's own range of distances: for a triangle seen on edge the
-    /// quotient says nothing.
+    /// The corners of one triangle, axes permuted as the query's.
     #[inline(always)]
-    fn plane_distance(&self, lane: usize, query: &Query, relative: &[[f64; 3]; 3]) -> f64 {
-        let [a, b, c] = self.vertices.each_ref().map(|v| query.axes.map(|k| f64::from(v[k].as_array()[lane & 7])));
-        let minus = |p: [f64; 3], q: [f64; 3]| [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
-        let dot = |p: [f64; 3], q: [f64; 3]| p[0].mul_add(q[0], p[1].mul_add(q[1], p[2] * q[2]));
-        let normal = cross(minus(b, a), minus(c, a));
-        let [za, zb, zc] = relative.map(|r| r[2] * query.shear[2]);
-        let t = dot(normal, relative[0]) / dot(normal, query.direction);
-        // `max` takes the other operand where 0 / 0 gave NaN.
-        t.max(za.min(zb).min(zc)).min(za.max(zb).max(zc))
+    fn corners(&self, lane: usize, query: &Query) -> [[f64; 3]; 3] {
+        let [kx, ky, kz] = query.axes;
+        let at = |v: &[f32x8; 3], axis: usize| f64::from(v[axis].as_array()[lane & 7]);
+        let corner = |v: &[f32x8; 3]| [at(v, kx), at(v, ky), at(v, kz)];
+        let [a, b, c] = &self.vertices;
+        [corner(a), corner(b), corner(c)]
     }
+}
+
+#[inline(always)]
+fn minus(p: [f64; 3], q: [f64; 3]) -> [f64; 3] {
+    [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
+}
+
+#[inline(always)]
+fn dot(p: [f64; 3], q: [f64; 3]) -> f64 {
+    p[0].mul_add(q[0], p[1].mul_add(q[1], p[2] * q[2]))
+}
+
+/// Distance to the plane if it is within the open interval from 0 to `limit`; kept within the distances `z` of the
+/// corners, since for a triangle seen on edge the quotient says nothing. `relative` is the first corner seen from the
+/// origin.
+#[inline(always)]
+fn plane_distance(
+    [a, b, c]: [[f64; 3]; 3],
+    relative: [f64; 3],
+    direction: [f64; 3],
+    z: [f64; 3],
+    limit: f64,
+) -> Option<f64> {
+    let (least, most) = (z[0].min(z[1]).min(z[2]), z[0].max(z[1]).max(z[2]));
+    let normal = cross(minus(b, a), minus(c, a));
+    let (height, slope) = (dot(normal, relative), dot(normal, direction));
+    // Spares the surface that the ray leaves the division.
+    if least <= 0.0 && (height == 0.0 || (height < 0.0) != (slope < 0.0)) {
+        return None;
+    }
+    // `max` takes the other operand where 0 / 0 gave NaN.
+    let t = (height / slope).max(least).min(most);
+    (t > 0.0 && t < limit).then_some(t)
 }

@@ -1,7 +1,6 @@
 //! What a traversal needs to know about a ray, computed once.
 
-use glam::DVec3;
-use wide::f32x8;
+use glam::{DVec3, Vec3};
 
 use super::frame::Frame;
 use crate::geometry::Ray;
@@ -9,12 +8,12 @@ use crate::geometry::Ray;
 /// Local coordinates of everything in a [`Frame`] lie within \[-1, 1\]; origins beyond this are first moved to the box.
 const NEAR: f64 = 2.0;
 /// Smallest magnitude of a direction component for the box test, so that its inverse stays finite.
-const LEAST_DIRECTION: f64 = 1.0 / (1u64 << 50) as f64;
+const LEAST_DIRECTION: f32 = 1.0 / (1u64 << 50) as f32;
 /// Absolute part of the box test's tolerance; with the bound above it spans more than the scene, so that a ray within
 /// the plane of a box's face stays inside. Far above the rounding of the exact test (about 2^-50).
-const LEAST_PAD: f64 = 1.0 / (1u64 << 46) as f64;
+const LEAST_PAD: f32 = 1.0 / (1u64 << 46) as f32;
 /// Relative part of the box test's tolerance: rounding the origin to `f32` and the product with the inverse direction.
-const PAD: f64 = 1.0 / (1u64 << 22) as f64;
+const PAD: f32 = 1.0 / (1u64 << 22) as f32;
 
 /// The constants of one ray, in the hierarchy's frame.
 pub struct Query {
@@ -34,22 +33,16 @@ pub struct Query {
     /// Largest absolute coordinate of that origin, for the error bounds.
     pub magnitude: f32,
     /// The shear in `f32`.
-    pub shear32: [f32x8; 3],
-    /// The sheared origin in `f32`.
-    pub origin32: [f32x8; 3],
-    /// Which of a node's six planes come first along the ray; the others are these XOR 1.
-    pub near: [usize; 3],
-    /// Inverse direction.
-    pub inverse: [f32x8; 3],
-    /// `inverse * origin`, tolerance included, for the near planes.
-    pub near_origin: [f32x8; 3],
-    /// `inverse * origin`, tolerance included, for the far planes.
-    pub far_origin: [f32x8; 3],
+    pub shear32: [f32; 3],
+    /// The origin in `f32`, x and y sheared.
+    pub origin32: [f32; 3],
+    /// For the box test.
+    pub slabs: Slabs,
 }
 
 impl Query {
     /// `None` if the ray cannot hit anything: it is not a ray (see [`Ray`]), or misses the frame's box.
-    #[inline]
+    #[inline(always)]
     pub fn new(ray: &Ray, frame: &Frame) -> Option<Self> {
         let origin = frame.to_local(ray.origin);
         let length = ray.direction.length_squared();
@@ -58,65 +51,96 @@ impl Query {
         if !(length > 0.25 && length < 4.0 && tmax > 0.0) {
             return None;
         }
-        let (start, clipped, slack) = if origin.abs().max_element() <= NEAR && origin.is_finite() {
-            (0.0, origin, 0.0)
+        let Clipped { start, point, slack } = if origin.abs().max_element() <= NEAR {
+            Clipped { start: 0.0, point: origin, slack: 0.0 }
         } else {
             clip(origin, ray.direction, tmax)?
         };
-        Some(Self::with_start(origin, ray.direction, tmax, start, clipped, slack))
-    }
-
-    #[inline]
-    fn with_start(origin: DVec3, direction: DVec3, tmax: f64, start: f64, clipped: DVec3, slack: f64) -> Self {
-        let (o, d, c) = (origin.to_array(), direction.to_array(), clipped.to_array());
-        let size = direction.abs();
-        let last = if size.x > size.y {
-            if size.x > size.z { 0 } else { 2 }
+        let size = ray.direction.abs();
+        let axes = if size.x > size.y && size.x > size.z {
+            [1, 2, 0]
         } else if size.y > size.z {
-            1
+            [2, 0, 1]
         } else {
-            2
+            [0, 1, 2]
         };
-        let axes = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][last];
-        let permute = |v: [f64; 3]| axes.map(|axis| v[axis]);
-        let (dp, cp) = (permute(d), permute(c));
-        let unit = 1.0 / dp[2];
-        let shear = [dp[0] * unit, dp[1] * unit, unit];
-        let splat = |v: f64| f32x8::splat(v as f32);
-        let bounded = d.map(|d| if d.abs() < LEAST_DIRECTION { LEAST_DIRECTION.copysign(d) } else { d });
-        let inverse = bounded.map(|d| 1.0 / d as f32);
-        // The tolerance moves near planes nearer and far planes farther, whichever way the ray goes.
-        let pad = |i: usize| ((PAD * (c[i].abs() + slack) + LEAST_PAD) as f32).copysign(inverse[i]);
-        let folded = |sign: f32| [0, 1, 2].map(|i| f32x8::splat(inverse[i] * (c[i] as f32 + sign * pad(i))));
-        Self {
+        let permute = |v: DVec3| [v[axes[0]], v[axes[1]], v[axes[2]]];
+        let (direction, place) = (permute(ray.direction), permute(point));
+        let unit = 1.0 / direction[2];
+        let shear = [direction[0] * unit, direction[1] * unit, unit];
+        let slabs = Slabs::new(ray.direction, point, slack);
+        Some(Self {
             axes,
-            origin: permute(o),
-            direction: dp,
+            origin: permute(origin),
+            direction,
             shear,
             tmax,
             start,
-            magnitude: (clipped.abs().max_element() + slack) as f32,
-            shear32: shear.map(splat),
-            origin32: [splat(cp[0] - shear[0] * cp[2]), splat(cp[1] - shear[1] * cp[2]), splat(cp[2])],
-            near: [0, 1, 2].map(|i| 2 * i + usize::from(inverse[i] < 0.0)),
-            inverse: inverse.map(f32x8::splat),
-            near_origin: folded(1.0),
-            far_origin: folded(-1.0),
+            magnitude: (point.abs().max_element() + slack) as f32,
+            shear32: [shear[0] as f32, shear[1] as f32, shear[2] as f32],
+            origin32: [
+                (place[0] - shear[0] * place[2]) as f32,
+                (place[1] - shear[1] * place[2]) as f32,
+                place[2] as f32,
+            ],
+            slabs,
+        })
+    }
+}
+
+/// The box test's constants, per axis.
+pub struct Slabs {
+    /// Which of a node's six planes come first along the ray; the others are these XOR 1.
+    pub near: [usize; 3],
+    /// Inverse direction.
+    pub inverse: Vec3,
+    /// `inverse * origin`, tolerance included, for the near planes.
+    pub near_origin: Vec3,
+    /// `inverse * origin`, tolerance included, for the far planes.
+    pub far_origin: Vec3,
+}
+
+impl Slabs {
+    #[inline(always)]
+    fn new(direction: DVec3, origin: DVec3, slack: f64) -> Self {
+        let (d, o) = (direction.as_vec3(), origin.as_vec3());
+        let inverse = d.abs().max(Vec3::splat(LEAST_DIRECTION)).copysign(d).recip();
+        // The tolerance moves near planes nearer and far planes farther, whichever way the ray goes.
+        let pad = (PAD * (o.abs() + slack as f32) + LEAST_PAD).copysign(d);
+        Self {
+            // By the sign of the inverse, which a direction of -0 has too.
+            near: [
+                usize::from(d.x.is_sign_negative()),
+                2 + usize::from(d.y.is_sign_negative()),
+                4 + usize::from(d.z.is_sign_negative()),
+            ],
+            inverse,
+            near_origin: inverse * (o + pad),
+            far_origin: inverse * (o - pad),
         }
     }
 }
 
-/// Moves a far origin to where the ray enters the frame's box: the distance, the point, and a bound on its rounding
-/// in the units of `f32`'s own (so that it adds to the coordinate's magnitude). `None` if the ray misses the box.
+/// Where the `f32` part of a query starts.
+struct Clipped {
+    /// Distance from the ray's origin.
+    start: f64,
+    /// The point there.
+    point: DVec3,
+    /// Bound on that point's rounding, as the coordinate whose rounding in `f32` would be as large.
+    slack: f64,
+}
+
+/// Moves a far origin to where the ray enters the frame's box; `None` if the ray misses the box.
 #[cold]
-fn clip(origin: DVec3, direction: DVec3, tmax: f64) -> Option<(f64, DVec3, f64)> {
+fn clip(origin: DVec3, direction: DVec3, tmax: f64) -> Option<Clipped> {
     if !origin.is_finite() {
         return None;
     }
     // Slightly larger than the box, relative to the origin's distance, so that rounding loses nothing.
     let distance = origin.abs().max_element();
-    let half = 1.0 + 8.0 * f64::EPSILON * distance;
-    let inverse = direction.map(|d| 1.0 / if d.abs() < 1e-300 { 1e-300f64.copysign(d) } else { d });
+    let half = DVec3::splat(1.0 + 8.0 * f64::EPSILON * distance);
+    let inverse = direction.abs().max(DVec3::splat(1e-300)).copysign(direction).recip();
     let (a, b) = ((-half - origin) * inverse, (half - origin) * inverse);
     let (enter, leave) = (a.min(b).max_element(), a.max(b).min_element());
     if !(enter <= leave * (1.0 + 4.0 * f64::EPSILON) && leave > 0.0 && enter < tmax) {
@@ -124,5 +148,5 @@ fn clip(origin: DVec3, direction: DVec3, tmax: f64) -> Option<(f64, DVec3, f64)>
     }
     let start = enter.max(0.0);
     let ratio = f64::EPSILON / f64::from(f32::EPSILON);
-    Some((start, origin + start * direction, 4.0 * ratio * distance))
+    Some(Clipped { start, point: origin + start * direction, slack: 4.0 * ratio * distance })
 }

@@ -3,7 +3,7 @@
 use super::Bvh;
 use super::query::Query;
 use super::wide::{Child, ChildKind};
-use crate::geometry::{Hit, Primitive, Ray};
+use crate::geometry::{Primitive, Ray};
 
 /// Levels of wide nodes that [`super::collapse`] never exceeds.
 pub const MAX_DEPTH: usize = 36;
@@ -12,12 +12,13 @@ const FULL_STACK: usize = 256;
 const _: () = assert!(7 * MAX_DEPTH < FULL_STACK);
 
 /// The closest hit so far.
-struct Best {
+pub struct Best {
     /// Distance in local units.
-    t: f64,
+    pub t: f64,
     /// Not below the distance from the query's `f32` origin.
     t32: f32,
-    primitive: Option<Primitive>,
+    /// What it is on.
+    pub primitive: Option<Primitive>,
 }
 
 impl Best {
@@ -43,25 +44,15 @@ const fn entry(t: f32, child: Child) -> u64 {
 }
 
 impl Bvh {
-    /// The closest hit.
-    pub(super) fn closest(&self, query: &Query, ray: &Ray) -> Option<Hit> {
-        let best = self.dispatch::<false>(query, ray);
-        best.primitive.map(|primitive| Hit { t: best.t * self.frame.inverse, primitive })
-    }
-
-    /// Whether there is any hit.
-    pub(super) fn any(&self, query: &Query, ray: &Ray) -> bool {
-        self.dispatch::<true>(query, ray).primitive.is_some()
-    }
-
-    /// Small hierarchies get a small stack, which costs less to clear.
+    /// The closest hit, or with `ANY` the first one met. Small hierarchies get a small stack, which costs less to clear.
     #[inline(always)]
-    fn dispatch<const ANY: bool>(&self, query: &Query, ray: &Ray) -> Best {
-        match self.stack {
-            0..=8 => self.traverse::<ANY, 8>(query, ray),
-            9..=64 => self.traverse::<ANY, 64>(query, ray),
-            _ => self.traverse::<ANY, FULL_STACK>(query, ray),
-        }
+    pub(super) fn dispatch<const ANY: bool>(&self, ray: &Ray) -> Option<Best> {
+        let query = Query::new(ray, &self.frame)?;
+        Some(match self.stack {
+            0..=16 => self.traverse::<ANY, 16>(&query, ray),
+            17..=64 => self.traverse::<ANY, 64>(&query, ray),
+            _ => self.traverse::<ANY, FULL_STACK>(&query, ray),
+        })
     }
 
     #[inline(always)]

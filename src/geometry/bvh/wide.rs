@@ -79,8 +79,12 @@ impl Node {
     #[inline(always)]
     pub fn enter(&self, query: &Query, limit: f32) -> (u32, f32x8) {
         const SLACK: f32 = 1.0 + 1.0 / (1u32 << 20) as f32;
-        let near = |i: usize| self.planes[query.near[i]].mul_sub(query.inverse[i], query.near_origin[i]);
-        let far = |i: usize| self.planes[query.near[i] ^ 1].mul_sub(query.inverse[i], query.far_origin[i]);
+        let slabs = &query.slabs;
+        let (x, y, z) = (slabs.inverse.x, slabs.inverse.y, slabs.inverse.z);
+        let inverse = [f32x8::splat(x), f32x8::splat(y), f32x8::splat(z)];
+        let (near_origin, far_origin) = (slabs.near_origin.to_array(), slabs.far_origin.to_array());
+        let near = |i: usize| self.planes[slabs.near[i]].mul_sub(inverse[i], f32x8::splat(near_origin[i]));
+        let far = |i: usize| self.planes[slabs.near[i] ^ 1].mul_sub(inverse[i], f32x8::splat(far_origin[i]));
         let enter = near(0).fast_max(near(1)).fast_max(near(2).fast_max(f32x8::ZERO));
         let leave = far(0).fast_min(far(1)).fast_min(far(2).fast_min(f32x8::splat(limit)));
         (enter.simd_le(leave * f32x8::splat(SLACK)).to_bitmask(), enter)
