@@ -3,11 +3,11 @@
 
 use ndarray::{Array2, Array3};
 use pathblend::blend::{
-    BlendError, FeatureSet, INTEGRATOR_KEY, Input, Objective, Options, Pair, RowSettings, SCENE_KEY, append, apply,
-    leave_one_out, train, weight_map,
+    BlendError, FeatureSet, Input, Objective, Options, Pair, RowSettings, append, apply, leave_one_out, train,
+    weight_map,
 };
 use pathblend::forest::{Model, Rows, Settings};
-use pathblend::image::{Image, Layer, luminance};
+use pathblend::image::{INTEGRATOR_KEY, Image, Layer, SCENE_KEY, luminance};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde_json::json;

@@ -8,12 +8,7 @@ use super::planes::{Class, Planes};
 use super::predict::{UNKNOWN, feature_set, forest_weights, mix, mix_colours, mix_planes};
 use super::{BlendError, Input};
 use crate::forest::Model;
-use crate::image::{Image, Layer};
-
-/// Manifest key under which an image names its integrator.
-pub const INTEGRATOR_KEY: &str = "integrator";
-/// Manifest key under which an image names its scene's hash.
-pub const SCENE_KEY: &str = "scene_hash";
+use crate::image::{INTEGRATOR_KEY, Image, Layer, SCENE_KEY};
 
 /// The weight of image a at every pixel, height × width, in [0, 1]: the forest's prediction; 0.5 where a pixel has no
 /// light in any class of either image; all weight on the other image where one's colour is not finite.

@@ -5,6 +5,8 @@
 //! Images are black boxes: colour, and `path_*` layers of class luminances, from this program or another.
 
 mod apply;
+mod builtin;
+mod campaign;
 mod error;
 mod evaluate;
 mod features;
@@ -15,7 +17,9 @@ mod rows;
 mod table;
 mod weights;
 
-pub use apply::{INTEGRATOR_KEY, SCENE_KEY, apply, weight_layer, weight_map};
+pub use apply::{apply, weight_layer, weight_map};
+pub use builtin::builtin;
+pub use campaign::{Findings, Recipe, RecipeScene, Reference};
 pub use error::BlendError;
 pub use evaluate::{Options, Pair, leave_one_out};
 pub use features::FeatureSet;

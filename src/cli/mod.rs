@@ -107,6 +107,15 @@ fn check_output(path: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Writes a model, with its size in bytes as the result.
+fn write_model(model: &crate::forest::Model, path: &Path) -> anyhow::Result<u64> {
+    if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+        std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    }
+    model.save(path)?;
+    Ok(std::fs::metadata(path)?.len())
+}
+
 /// `30s`, `1.5m`, `2h`, `500ms`; a bare number means seconds.
 fn parse_time(text: &str) -> Result<Duration, String> {
     let split = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());

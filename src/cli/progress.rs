@@ -21,7 +21,8 @@ impl Reporter {
             return Self::Lines { what: what.to_owned(), last: Instant::now() };
         }
         let bar = ProgressBar::new(1000).with_message(what.to_owned());
-        if let Ok(style) = ProgressStyle::with_template("{msg:>12} [{bar:40}] {percent:>3}% {elapsed} (eta {eta}) {prefix}")
+        if let Ok(style) =
+            ProgressStyle::with_template("{msg:>12} [{bar:40}] {percent:>3}% {elapsed} (eta {eta}) {prefix}")
         {
             bar.set_style(style.progress_chars("=> "));
         }

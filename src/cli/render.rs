@@ -63,11 +63,9 @@ impl Render {
             (Some(passes), _) => Budget::Passes(passes),
             (None, time) => Budget::Wall(time.unwrap_or(DEFAULT_TIME)),
         };
-        let settings =
-            Settings { seed: self.seed, max_depth: scene.max_depth, features: !self.no_features, budget };
+        let settings = Settings { seed: self.seed, max_depth: scene.max_depth, features: !self.no_features, budget };
         let mut reporter = Reporter::new(self.integrator.name());
-        let outcome =
-            on_threads(self.threads, || render(&scene, self.integrator, &settings, |p| reporter.update(p)))?;
+        let outcome = on_threads(self.threads, || render(&scene, self.integrator, &settings, |p| reporter.update(p)))?;
         reporter.finish();
         let precision = if self.half { Precision::Half } else { Precision::Float };
         outcome.image.write(&self.output, &WriteOptions { precision, split: self.split })?;

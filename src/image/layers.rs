@@ -8,6 +8,11 @@ use serde_json::{Map, Value};
 
 use super::{ImageError, WriteOptions, exr};
 
+/// Manifest key under which an image names its integrator.
+pub const INTEGRATOR_KEY: &str = "integrator";
+/// Manifest key under which an image names its scene's fingerprint.
+pub const SCENE_KEY: &str = "scene_hash";
+
 /// Luminance of linear Rec.709 red, green and blue (ITU-R BT.709-6, item 3.2).
 pub const LUMINANCE_WEIGHTS: [f32; 3] = [0.2126, 0.7152, 0.0722];
 

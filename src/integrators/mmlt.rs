@@ -16,6 +16,7 @@ use crate::scene::{Caster, Scene};
 use crate::spectrum::Spectrum;
 use glam::DVec2;
 use rayon::prelude::*;
+use std::ops::RangeInclusive;
 
 /// Longest path that is left to path tracing.
 const DIRECT_DEPTH: usize = 2;
@@ -23,8 +24,9 @@ const DIRECT_DEPTH: usize = 2;
 /// Chains per path length. Each lane owns one of each length, its random streams and its splats.
 const LANES: usize = 16;
 
-/// Independent samples at the start, over all lengths.
-const BOOTSTRAP_SAMPLES: usize = 200_000;
+/// Independent samples at the start, over all lengths: two per pixel, within these bounds. Large steps refine what they
+/// find, so that they need not be many.
+const BOOTSTRAP_SAMPLES: RangeInclusive<usize> = 20_000..=200_000;
 
 /// A path as the film sees it.
 #[derive(Clone, Copy)]
@@ -89,7 +91,9 @@ fn rows(edges: usize) -> usize {
 impl Mmlt {
     pub(super) fn start(scene: &Scene, settings: &Settings) -> Self {
         let lengths = DIRECT_DEPTH + 1..=settings.max_depth;
-        let per_length = BOOTSTRAP_SAMPLES / lengths.clone().count().max(1);
+        let pixels: usize = scene.camera.size.iter().product();
+        let samples = (2 * pixels).clamp(*BOOTSTRAP_SAMPLES.start(), *BOOTSTRAP_SAMPLES.end());
+        let per_length = samples / lengths.clone().count().max(1);
         let mut this = Self {
             direct: Path::up_to(settings, DIRECT_DEPTH),
             lengths: Vec::new(),

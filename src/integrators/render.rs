@@ -1,8 +1,8 @@
 //! The render loop: passes until the budget is spent, then the image with what is known of how it was made.
 
 use super::{Counts, Integrator, Method};
-use crate::film::{Film, PathClass};
-use crate::image::Image;
+use crate::film::{Film, Health, PathClass};
+use crate::image::{INTEGRATOR_KEY, Image, SCENE_KEY};
 use crate::scene::Scene;
 use cpu_time::ProcessTime;
 use serde_json::{Map, Value, json};
@@ -53,6 +53,8 @@ pub struct Outcome {
     pub cpu: Duration,
     /// Samples, rays, acceptance.
     pub counts: Counts,
+    /// What went wrong on the way.
+    pub health: Health,
 }
 
 /// Renders `scene` with `method` on the current rayon thread pool. `progress` is called after each pass.
@@ -74,8 +76,9 @@ pub fn render(scene: &Scene, method: Method, settings: &Settings, mut progress: 
         }
     }
     let image = film.develop(passes.max(1) as f64);
-    let mut outcome = Outcome { image, passes, wall: wall.elapsed(), cpu: cpu.elapsed(), counts };
-    outcome.image.manifest = manifest(scene, method, settings, &film, &outcome);
+    let mut outcome =
+        Outcome { image, passes, wall: wall.elapsed(), cpu: cpu.elapsed(), counts, health: film.health() };
+    outcome.image.manifest = manifest(scene, method, settings, &outcome);
     outcome
 }
 
@@ -110,7 +113,7 @@ impl Outcome {
     }
 }
 
-fn manifest(scene: &Scene, method: Method, settings: &Settings, film: &Film, outcome: &Outcome) -> Map<String, Value> {
+fn manifest(scene: &Scene, method: Method, settings: &Settings, outcome: &Outcome) -> Map<String, Value> {
     let classes: Map<String, Value> = PathClass::all()
         .filter(|class| outcome.image.layers.contains_key(&class.layer_name()))
         .map(|class| (class.layer_name(), Value::from(class.light_path_expression())))
@@ -124,8 +127,8 @@ fn manifest(scene: &Scene, method: Method, settings: &Settings, film: &Film, out
     let mut manifest = Map::new();
     let mut set = |name: &str, value: Value| manifest.insert(name.to_owned(), value);
     set("software", json!(concat!("pathblend ", env!("CARGO_PKG_VERSION"))));
-    set("scene", json!(scene.hash));
-    set("integrator", json!(method.name()));
+    set(SCENE_KEY, json!(scene.hash));
+    set(INTEGRATOR_KEY, json!(method.name()));
     set("seed", json!(settings.seed));
     set("max_depth", json!(settings.max_depth));
     set("budget", budget);
@@ -135,7 +138,7 @@ fn manifest(scene: &Scene, method: Method, settings: &Settings, film: &Film, out
     set("samples", json!(outcome.counts.samples));
     set("samples_per_pixel", json!(outcome.counts.samples as f64 / pixels as f64));
     set("rays", json!(outcome.counts.rays));
-    set("health", json!(film.health()));
+    set("health", json!(outcome.health));
     if !outcome.counts.acceptance.is_empty() {
         set("acceptance", json!(outcome.counts.acceptance));
     }
