@@ -1,0 +1,148 @@
+//! Triangle meshes on their way into the world.
+
+use super::transform::normal_matrix;
+use crate::scene::Mesh;
+use glam::{DAffine3, DVec3};
+
+/// A mesh in its own space.
+#[derive(Clone, Debug, Default)]
+pub(super) struct RawMesh {
+    pub positions: Vec<DVec3>,
+    /// One per position, of any length; empty where the file has none.
+    pub normals: Vec<DVec3>,
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// What a shape says about its normals.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Facing {
+    /// Flat faces, whatever normals there are.
+    pub face_normals: bool,
+    /// The other side is the outside.
+    pub flip_normals: bool,
+}
+
+impl RawMesh {
+    /// The mesh in world space, with normals as Mitsuba 3 has them: those of the file, moved by the inverse transpose;
+    /// where the file has none, they are averaged over the faces as these lie in the world; with `face_normals` there
+    /// are none, and faces look to where their corners turn counter-clockwise in the world.
+    pub fn place(self, to_world: &DAffine3, facing: Facing) -> Mesh {
+        let positions: Vec<_> = self
+            .positions
+            .iter()
+            .map(|p| to_world.transform_point3(*p))
+            .collect();
+        let normal_matrix = normal_matrix(to_world);
+        let mut normals: Vec<_> = match (facing.face_normals, self.normals.is_empty()) {
+            (true, _) => Vec::new(),
+            (false, true) => average_normals(&positions, &self.triangles),
+            (false, false) => self
+                .normals
+                .iter()
+                .map(|n| (normal_matrix * *n).normalize_or_zero())
+                .collect(),
+        };
+        let mut triangles = self.triangles;
+        if facing.flip_normals {
+            normals.iter_mut().for_each(|normal| *normal = -*normal);
+        }
+        for triangle in &mut triangles {
+            // Mitsuba shades and shines by the vertex normals: let the corners turn with them.
+            let [a, b, c] = triangle.map(|i| i as usize);
+            let turns_away = match normals.is_empty() {
+                true => facing.flip_normals,
+                false => {
+                    face(&positions, *triangle).dot(normals[a] + normals[b] + normals[c]) < 0.0
+                }
+            };
+            if turns_away {
+                triangle.swap(1, 2);
+            }
+        }
+        Mesh {
+            positions: positions.iter().map(|p| p.as_vec3()).collect(),
+            normals: normals.iter().map(|n| n.as_vec3()).collect(),
+            triangles,
+        }
+    }
+
+    /// The flat mesh in world space, outside kept outside: for the built-in shapes, whose normals Mitsuba moves by the
+    /// inverse transpose. A mirrored shape would turn inside out otherwise.
+    pub fn place_solid(mut self, to_world: &DAffine3, facing: Facing) -> Mesh {
+        let mirrored = to_world.matrix3.determinant() < 0.0 && !facing.face_normals;
+        self.normals.clear();
+        self.place(
+            to_world,
+            Facing {
+                face_normals: true,
+                flip_normals: facing.flip_normals != mirrored,
+            },
+        )
+    }
+}
+
+/// Normal of a face, as long as twice its area.
+fn face(positions: &[DVec3], triangle: [u32; 3]) -> DVec3 {
+    let [a, b, c] = triangle.map(|i| positions[i as usize]);
+    (b - a).cross(c - a)
+}
+
+/// Face normals averaged at the vertices, weighted by the angle of the face there (Thürmer and Wüthrich 1998,
+/// *Computing Vertex Normals from Polygonal Facets*).
+fn average_normals(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<DVec3> {
+    let mut sums = vec![DVec3::ZERO; positions.len()];
+    for triangle in triangles {
+        let normal = face(positions, *triangle).normalize_or_zero();
+        let corners = triangle.map(|i| positions[i as usize]);
+        for i in 0..3 {
+            let here = corners[i];
+            let (next, previous) = (corners[(i + 1) % 3] - here, corners[(i + 2) % 3] - here);
+            let angle = next
+                .normalize_or_zero()
+                .dot(previous.normalize_or_zero())
+                .clamp(-1.0, 1.0)
+                .acos();
+            sums[triangle[i] as usize] += normal * angle;
+        }
+    }
+    sums.iter().map(|sum| sum.normalize_or_zero()).collect()
+}
+
+/// [-1, 1]² at z = 0, normal +z.
+pub(super) fn rectangle() -> RawMesh {
+    let corner = |x, y| DVec3::new(x, y, 0.0);
+    RawMesh {
+        positions: vec![
+            corner(-1.0, -1.0),
+            corner(1.0, -1.0),
+            corner(1.0, 1.0),
+            corner(-1.0, 1.0),
+        ],
+        normals: Vec::new(),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    }
+}
+
+/// [-1, 1]³, normals outwards.
+pub(super) fn cube() -> RawMesh {
+    // Corner i has its coordinates' signs in bits 0 (x), 1 (y) and 2 (z).
+    let sign = |i: u32, bit: u32| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
+    let quads = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    RawMesh {
+        positions: (0..8)
+            .map(|i| DVec3::new(sign(i, 0), sign(i, 1), sign(i, 2)))
+            .collect(),
+        normals: Vec::new(),
+        triangles: quads
+            .iter()
+            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+            .collect(),
+    }
+}
