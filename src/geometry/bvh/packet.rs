@@ -97,22 +97,29 @@ impl Packet {
         let corners = self.corners(lane, query);
         let relative = |p: [f64; 3]| minus(p, query.origin);
         let [ra, rb, rc] = [relative(corners[0]), relative(corners[1]), relative(corners[2])];
+        // First the plane: most candidates that fail are the surface that the ray leaves.
+        let [za, zb, zc] = [ra[2] * query.shear[2], rb[2] * query.shear[2], rc[2] * query.shear[2]];
+        let (least, most) = (lesser(za, lesser(zb, zc)), greater(za, greater(zb, zc)));
+        let normal = cross(minus(corners[1], corners[0]), minus(corners[2], corners[0]));
+        let (height, slope) = (dot(normal, ra), dot(normal, query.direction));
+        if least <= 0.0 && height * slope.signum() <= 0.0 {
+            return None;
+        }
         let sheared = |r: [f64; 3]| [r[0] - query.shear[0] * r[2], r[1] - query.shear[1] * r[2]];
         let [a, b, c] = [sheared(ra), sheared(rb), sheared(rc)];
         let u = c[0] * b[1] - c[1] * b[0];
         let v = a[0] * c[1] - a[1] * c[0];
         let w = b[0] * a[1] - b[1] * a[0];
-        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
-            return None;
-        }
+        let (low, high) = (lesser(u, lesser(v, w)), greater(u, greater(v, w)));
         let determinant = u + v + w;
-        if determinant == 0.0 {
+        if (low < 0.0 && high > 0.0) || determinant == 0.0 {
             return None;
         }
-        let z = [ra[2] * query.shear[2], rb[2] * query.shear[2], rc[2] * query.shear[2]];
-        let t = plane_distance(corners, ra, query.direction, z, limit)?;
+        // Within the corners' distances, since for a triangle seen on edge the quotient says nothing; 0 / 0 gives
+        // the least of them.
+        let t = lesser(greater(height / slope, least), most);
         let inverse = 1.0 / determinant;
-        Some(Refined { t, u: v * inverse, v: w * inverse })
+        (t > 0.0 && t < limit).then(|| Refined { t, u: v * inverse, v: w * inverse })
     }
 
     /// The corners of one triangle, axes permuted as the query's.
@@ -126,6 +133,18 @@ impl Packet {
     }
 }
 
+/// The smaller number, and the second of two that do not compare: one instruction, which `f64::min` is not.
+#[inline(always)]
+const fn lesser(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The larger number, and the second of two that do not compare.
+#[inline(always)]
+const fn greater(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
 #[inline(always)]
 fn minus(p: [f64; 3], q: [f64; 3]) -> [f64; 3] {
     [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
@@ -134,27 +153,4 @@ fn minus(p: [f64; 3], q: [f64; 3]) -> [f64; 3] {
 #[inline(always)]
 fn dot(p: [f64; 3], q: [f64; 3]) -> f64 {
     p[0].mul_add(q[0], p[1].mul_add(q[1], p[2] * q[2]))
-}
-
-/// Distance to the plane if it is within the open interval from 0 to `limit`; kept within the distances `z` of the
-/// corners, since for a triangle seen on edge the quotient says nothing. `relative` is the first corner seen from the
-/// origin.
-#[inline(always)]
-fn plane_distance(
-    [a, b, c]: [[f64; 3]; 3],
-    relative: [f64; 3],
-    direction: [f64; 3],
-    z: [f64; 3],
-    limit: f64,
-) -> Option<f64> {
-    let (least, most) = (z[0].min(z[1]).min(z[2]), z[0].max(z[1]).max(z[2]));
-    let normal = cross(minus(b, a), minus(c, a));
-    let (height, slope) = (dot(normal, relative), dot(normal, direction));
-    // Spares the surface that the ray leaves the division.
-    if least <= 0.0 && (height == 0.0 || (height < 0.0) != (slope < 0.0)) {
-        return None;
-    }
-    // `max` takes the other operand where 0 / 0 gave NaN.
-    let t = (height / slope).max(least).min(most);
-    (t > 0.0 && t < limit).then_some(t)
 }
