@@ -73,7 +73,7 @@ struct SceneArguments {
 impl SceneArguments {
     /// Loads the scene; warnings go to standard error.
     fn load(&self) -> anyhow::Result<crate::scene::Scene> {
-        let options = crate::load::Options { size: self.size, defines: self.define.iter().cloned().collect() };
+        let options = crate::load::Options { size: self.size, overrides: self.define.iter().cloned().collect() };
         let loaded = crate::load::read(&self.scene, &options)?;
         for warning in &loaded.warnings {
             eprintln!("warning: {warning}");

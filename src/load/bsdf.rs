@@ -7,31 +7,21 @@ use super::plugin::Plugin;
 use crate::bsdf::{Bsdf, Conductor, Dielectric, Diffuse, Distribution, Microfacet, RoughConductor};
 use crate::spectrum::Spectrum;
 
-const KINDS: [&str; 5] = [
-    "diffuse",
-    "conductor",
-    "roughconductor",
-    "dielectric",
-    "twosided",
-];
+const KINDS: [&str; 5] = ["diffuse", "conductor", "roughconductor", "dielectric", "twosided"];
 
 /// Reflectance of shapes without a BSDF, and of `diffuse` without a parameter.
 const GREY: f64 = 0.5;
 
 /// The model of shapes without a BSDF.
 pub(super) fn default() -> Bsdf {
-    Bsdf::Diffuse(Diffuse {
-        reflectance: Spectrum::grey(GREY),
-    })
+    Bsdf::Diffuse(Diffuse { reflectance: Spectrum::grey(GREY) })
 }
 
 /// Reads a scattering model.
 pub(super) fn read(element: Element<'_>) -> Result<Bsdf, LoadError> {
     let mut plugin = Plugin::new(element)?;
     let bsdf = match plugin.kind {
-        "diffuse" => Bsdf::Diffuse(Diffuse {
-            reflectance: plugin.share("reflectance", GREY)?,
-        }),
+        "diffuse" => Bsdf::Diffuse(Diffuse { reflectance: plugin.share("reflectance", GREY)? }),
         "conductor" => Bsdf::Conductor(conductor(&mut plugin)?),
         "roughconductor" => Bsdf::RoughConductor(rough_conductor(&mut plugin)?),
         "dielectric" => Bsdf::Dielectric(dielectric(&mut plugin)?),
@@ -44,14 +34,9 @@ pub(super) fn read(element: Element<'_>) -> Result<Bsdf, LoadError> {
 
 /// The model as it is on a surface whose normal points the other way.
 pub(super) fn turned(bsdf: Bsdf) -> Bsdf {
-    let black = Bsdf::Diffuse(Diffuse {
-        reflectance: Spectrum::BLACK,
-    });
+    let black = Bsdf::Diffuse(Diffuse { reflectance: Spectrum::BLACK });
     match bsdf {
-        Bsdf::Dielectric(glass) => Bsdf::Dielectric(Dielectric {
-            eta: 1.0 / glass.eta,
-            ..glass
-        }),
+        Bsdf::Dielectric(glass) => Bsdf::Dielectric(Dielectric { eta: 1.0 / glass.eta, ..glass }),
         Bsdf::TwoSided(sides) => {
             let [front, back] = *sides;
             Bsdf::TwoSided(Box::new([back, front]))
@@ -66,21 +51,14 @@ pub(super) fn turned(bsdf: Bsdf) -> Bsdf {
 fn conductor(plugin: &mut Plugin<'_>) -> Result<Conductor, LoadError> {
     let material = plugin.string("material")?;
     let valid = |colour: &Spectrum| colour.is_valid();
-    let mut index = |name| {
-        plugin
-            .colour(name)?
-            .map(|c| c.check(valid, "values of at least 0"))
-            .transpose()
-    };
+    let mut index = |name| plugin.colour(name)?.map(|c| c.check(valid, "values of at least 0")).transpose();
     let (eta, k) = (index("eta")?, index("k")?);
     if let Some(material) = material.filter(|material| material.value.text != "none") {
         return Err(material.refuse("none: measured metals come later; give `eta` and `k` instead"));
     }
     Ok(Conductor {
         // With η = 0 and any k, all light is reflected; k is 1 where it is not given.
-        index: eta
-            .filter(|eta| !eta.is_black())
-            .map(|eta| (eta, k.unwrap_or(Spectrum::ONE))),
+        index: eta.filter(|eta| !eta.is_black()).map(|eta| (eta, k.unwrap_or(Spectrum::ONE))),
         specular_reflectance: plugin.share("specular_reflectance", 1.0)?,
     })
 }
@@ -97,13 +75,7 @@ fn rough_conductor(plugin: &mut Plugin<'_>) -> Result<RoughConductor, LoadError>
         },
     };
     let alpha = plugin.positive("alpha")?.unwrap_or(0.1);
-    Ok(RoughConductor {
-        metal,
-        microfacet: Microfacet {
-            distribution,
-            alpha,
-        },
-    })
+    Ok(RoughConductor { metal, microfacet: Microfacet { distribution, alpha } })
 }
 
 fn dielectric(plugin: &mut Plugin<'_>) -> Result<Dielectric, LoadError> {
@@ -120,14 +92,8 @@ fn two_sided(plugin: &mut Plugin<'_>) -> Result<Bsdf, LoadError> {
     let nested = plugin.objects("bsdf")?;
     let side = |element: &Element<'_>| {
         // Refused before it is read, so that references cannot run in a circle.
-        if let Some(kind) = element
-            .attribute("type")
-            .filter(|kind| ["twosided", "dielectric"].contains(&kind.text))
-        {
-            return Err(kind.error(format!(
-                "a twosided bsdf cannot hold `{}`; expected an opaque bsdf",
-                kind.text
-            )));
+        if let Some(kind) = element.attribute("type").filter(|kind| ["twosided", "dielectric"].contains(&kind.text)) {
+            return Err(kind.error(format!("a twosided bsdf cannot hold `{}`; expected an opaque bsdf", kind.text)));
         }
         read(*element)
     };
@@ -135,10 +101,7 @@ fn two_sided(plugin: &mut Plugin<'_>) -> Result<Bsdf, LoadError> {
         [both] => [side(both)?, side(both)?],
         [front, back] => [side(front)?, side(back)?],
         _ => {
-            let message = format!(
-                "a twosided bsdf with {} nested <bsdf>; expected one or two",
-                nested.len()
-            );
+            let message = format!("a twosided bsdf with {} nested <bsdf>; expected one or two", nested.len());
             return Err(plugin.element.error(message));
         }
     };
@@ -154,23 +117,11 @@ mod tests {
     /// A turned model does from below what the model does from above.
     #[test]
     fn turned_models_mirror() {
-        let glass = Dielectric {
-            eta: 1.5,
-            specular_reflectance: Spectrum::ONE,
-            specular_transmittance: Spectrum::ONE,
-        };
-        let mirror = Conductor {
-            index: None,
-            specular_reflectance: Spectrum::grey(0.9),
-        };
+        let glass = Dielectric { eta: 1.5, specular_reflectance: Spectrum::ONE, specular_transmittance: Spectrum::ONE };
+        let mirror = Conductor { index: None, specular_reflectance: Spectrum::grey(0.9) };
         let sides = Bsdf::TwoSided(Box::new([default(), Bsdf::Conductor(mirror)]));
         let mut stream = Stream::new(1, &[]);
-        for bsdf in [
-            default(),
-            Bsdf::Conductor(mirror),
-            Bsdf::Dielectric(glass),
-            sides,
-        ] {
+        for bsdf in [default(), Bsdf::Conductor(mirror), Bsdf::Dielectric(glass), sides] {
             let other = turned(bsdf.clone());
             for wi in [DVec3::new(0.6, 0.0, 0.8), DVec3::new(0.0, 0.28, -0.96)] {
                 let row = stream.row();
@@ -178,9 +129,7 @@ mod tests {
                 let here = bsdf.sample(wi, row, Walk::FromCamera);
                 let there = other.sample(mirrored(wi), row, Walk::FromCamera);
                 let seen = here.map(|s| (s.direction, s.weight));
-                let expected = there
-                    .filter(|s| !s.weight.is_black())
-                    .map(|s| (mirrored(s.direction), s.weight));
+                let expected = there.filter(|s| !s.weight.is_black()).map(|s| (mirrored(s.direction), s.weight));
                 assert_eq!(seen.is_some(), expected.is_some(), "{bsdf:?} {wi}");
                 if let (Some((a, x)), Some((b, y))) = (seen, expected) {
                     assert!((a - b).length() < 1e-12 && x == y, "{bsdf:?} {wi}");

@@ -37,11 +37,7 @@ pub struct Place {
 impl LoadError {
     /// An error that concerns the whole file.
     pub(super) fn whole(file: &Path, message: impl Into<String>) -> Self {
-        Self {
-            file: file.to_owned(),
-            place: None,
-            message: printable(&message.into()),
-        }
+        Self { file: file.to_owned(), place: None, message: printable(&message.into()) }
     }
 
     fn describe(&self) -> String {
@@ -64,43 +60,23 @@ impl Place {
     pub(super) fn at(text: &str, offset: usize) -> Self {
         let before = text.get(..offset).unwrap_or(text);
         let start = before.rfind('\n').map_or(0, |newline| newline + 1);
-        let line = text
-            .get(start..)
-            .and_then(|rest| rest.lines().next())
-            .unwrap_or_default();
+        let line = text.get(start..).and_then(|rest| rest.lines().next()).unwrap_or_default();
         let column = before[start..].chars().count();
         let (excerpt, indent) = cut(line, column);
-        Self {
-            line: before.matches('\n').count() + 1,
-            column: column + 1,
-            excerpt,
-            indent,
-        }
+        Self { line: before.matches('\n').count() + 1, column: column + 1, excerpt, indent }
     }
 }
 
 /// At most [`SHOWN`] characters of `line` around `column`, and how many of them stand before it.
 fn cut(line: &str, column: usize) -> (String, usize) {
-    let skipped = if column < SHOWN {
-        0
-    } else {
-        column - SHOWN / 2
-    };
+    let skipped = if column < SHOWN { 0 } else { column - SHOWN / 2 };
     let excerpt: String = line.chars().skip(skipped).take(SHOWN).collect();
     (printable(&excerpt), column - skipped)
 }
 
 /// The text on one line, with the characters replaced that would garble a terminal.
 pub(super) fn printable(text: &str) -> String {
-    text.chars()
-        .map(|c| {
-            if c.is_control() && c != '\t' {
-                char::REPLACEMENT_CHARACTER
-            } else {
-                c
-            }
-        })
-        .collect()
+    text.chars().map(|c| if c.is_control() && c != '\t' { char::REPLACEMENT_CHARACTER } else { c }).collect()
 }
 
 /// `nothing`, `a`, or `one of a, b, c`.
@@ -108,14 +84,7 @@ pub(super) fn one_of<S: AsRef<str>>(names: &[S]) -> String {
     match names {
         [] => "nothing".to_owned(),
         [only] => only.as_ref().to_owned(),
-        _ => format!(
-            "one of {}",
-            names
-                .iter()
-                .map(AsRef::as_ref)
-                .collect::<Vec<_>>()
-                .join(", ")
-        ),
+        _ => format!("one of {}", names.iter().map(AsRef::as_ref).collect::<Vec<_>>().join(", ")),
     }
 }
 
@@ -128,13 +97,8 @@ mod tests {
         let text = "<scene>\r\n\t<bsdf type=\"ä\" id=\"velvet\"/>\r\n</scene>";
         let place = Place::at(text, text.find("id").unwrap_or_default());
         assert_eq!((place.line, place.column), (2, 17));
-        let error = LoadError {
-            file: "s.xml".into(),
-            place: Some(place),
-            message: "odd".into(),
-        };
-        let expected =
-            "s.xml:2:17: odd\n   | \t<bsdf type=\"ä\" id=\"velvet\"/>\n   | \t               ^";
+        let error = LoadError { file: "s.xml".into(), place: Some(place), message: "odd".into() };
+        let expected = "s.xml:2:17: odd\n   | \t<bsdf type=\"ä\" id=\"velvet\"/>\n   | \t               ^";
         assert_eq!(error.to_string(), expected);
     }
 

@@ -31,18 +31,11 @@ const INDICES: [(&str, f64); 23] = [
 
 /// The index of a material by its name, in upper or lower case.
 fn named(name: &str) -> Option<f64> {
-    INDICES
-        .iter()
-        .find(|(known, _)| known.eq_ignore_ascii_case(name))
-        .map(|(_, index)| *index)
+    INDICES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).map(|(_, index)| *index)
 }
 
 /// The parameter `name`, a positive number or the name of a material; `default` where it is not given.
-pub(super) fn read(
-    plugin: &mut Plugin<'_>,
-    name: &'static str,
-    default: f64,
-) -> Result<f64, LoadError> {
+pub(super) fn read(plugin: &mut Plugin<'_>, name: &'static str, default: f64) -> Result<f64, LoadError> {
     let Some(parameter) = plugin.float_or_string(name)? else {
         return Ok(default);
     };

@@ -27,20 +27,12 @@ impl RawMesh {
     /// where the file has none, they are averaged over the faces as these lie in the world; with `face_normals` there
     /// are none, and faces look to where their corners turn counter-clockwise in the world.
     pub fn place(self, to_world: &DAffine3, facing: Facing) -> Mesh {
-        let positions: Vec<_> = self
-            .positions
-            .iter()
-            .map(|p| to_world.transform_point3(*p))
-            .collect();
+        let positions: Vec<_> = self.positions.iter().map(|p| to_world.transform_point3(*p)).collect();
         let normal_matrix = normal_matrix(to_world);
         let mut normals: Vec<_> = match (facing.face_normals, self.normals.is_empty()) {
             (true, _) => Vec::new(),
             (false, true) => average_normals(&positions, &self.triangles),
-            (false, false) => self
-                .normals
-                .iter()
-                .map(|n| (normal_matrix * *n).normalize_or_zero())
-                .collect(),
+            (false, false) => self.normals.iter().map(|n| (normal_matrix * *n).normalize_or_zero()).collect(),
         };
         let mut triangles = self.triangles;
         if facing.flip_normals {
@@ -51,9 +43,7 @@ impl RawMesh {
             let [a, b, c] = triangle.map(|i| i as usize);
             let turns_away = match normals.is_empty() {
                 true => facing.flip_normals,
-                false => {
-                    face(&positions, *triangle).dot(normals[a] + normals[b] + normals[c]) < 0.0
-                }
+                false => face(&positions, *triangle).dot(normals[a] + normals[b] + normals[c]) < 0.0,
             };
             if turns_away {
                 triangle.swap(1, 2);
@@ -71,13 +61,7 @@ impl RawMesh {
     pub fn place_solid(mut self, to_world: &DAffine3, facing: Facing) -> Mesh {
         let mirrored = to_world.matrix3.determinant() < 0.0 && !facing.face_normals;
         self.normals.clear();
-        self.place(
-            to_world,
-            Facing {
-                face_normals: true,
-                flip_normals: facing.flip_normals != mirrored,
-            },
-        )
+        self.place(to_world, Facing { face_normals: true, flip_normals: facing.flip_normals != mirrored })
     }
 }
 
@@ -97,11 +81,7 @@ fn average_normals(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<DVec3> {
         for i in 0..3 {
             let here = corners[i];
             let (next, previous) = (corners[(i + 1) % 3] - here, corners[(i + 2) % 3] - here);
-            let angle = next
-                .normalize_or_zero()
-                .dot(previous.normalize_or_zero())
-                .clamp(-1.0, 1.0)
-                .acos();
+            let angle = next.normalize_or_zero().dot(previous.normalize_or_zero()).clamp(-1.0, 1.0).acos();
             sums[triangle[i] as usize] += normal * angle;
         }
     }
@@ -112,12 +92,7 @@ fn average_normals(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<DVec3> {
 pub(super) fn rectangle() -> RawMesh {
     let corner = |x, y| DVec3::new(x, y, 0.0);
     RawMesh {
-        positions: vec![
-            corner(-1.0, -1.0),
-            corner(1.0, -1.0),
-            corner(1.0, 1.0),
-            corner(-1.0, 1.0),
-        ],
+        positions: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
         normals: Vec::new(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],
     }
@@ -127,22 +102,10 @@ pub(super) fn rectangle() -> RawMesh {
 pub(super) fn cube() -> RawMesh {
     // Corner i has its coordinates' signs in bits 0 (x), 1 (y) and 2 (z).
     let sign = |i: u32, bit: u32| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
-    let quads = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     RawMesh {
-        positions: (0..8)
-            .map(|i| DVec3::new(sign(i, 0), sign(i, 1), sign(i, 2)))
-            .collect(),
+        positions: (0..8).map(|i| DVec3::new(sign(i, 0), sign(i, 1), sign(i, 2))).collect(),
         normals: Vec::new(),
-        triangles: quads
-            .iter()
-            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-            .collect(),
+        triangles: quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
     }
 }

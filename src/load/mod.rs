@@ -40,14 +40,7 @@ pub const UNBOUNDED_DEPTH: usize = 65;
 /// Largest `max_depth` that a scene may ask for.
 pub const LARGEST_DEPTH: usize = 4096;
 
-const TAGS: [&str; 6] = [
-    "default",
-    "integrator",
-    "sensor",
-    "bsdf",
-    "emitter",
-    "shape",
-];
+const TAGS: [&str; 6] = ["default", "integrator", "sensor", "bsdf", "emitter", "shape"];
 
 /// What the caller changes about a scene.
 #[derive(Clone, Debug, Default)]
@@ -77,22 +70,12 @@ pub fn read(path: &Path, options: &Options) -> Result<Loaded, LoadError> {
     }
     let tree = source.parse()?;
     let document = Document::new(&source, &tree, &options.overrides)?;
-    let mut reader = Reader {
-        size: options.size,
-        ..Reader::default()
-    };
+    let mut reader = Reader { size: options.size, ..Reader::default() };
     reader.builder.fingerprint(source.text.as_bytes());
-    for text in options
-        .overrides
-        .iter()
-        .flat_map(|(name, value)| [name, value])
-    {
+    for text in options.overrides.iter().flat_map(|(name, value)| [name, value]) {
         reader.builder.fingerprint(text.as_bytes());
     }
-    let root = Element {
-        document: &document,
-        node: tree.root_element(),
-    };
+    let root = Element { document: &document, node: tree.root_element() };
     check_root(root)?;
     for element in root.children() {
         reader.element(element)?;
@@ -102,19 +85,13 @@ pub fn read(path: &Path, options: &Options) -> Result<Loaded, LoadError> {
 
 fn check_root(root: Element<'_>) -> Result<(), LoadError> {
     if root.tag() != "scene" {
-        return Err(root.error(format!(
-            "found <{}>; expected <scene version=\"3.0.0\">",
-            root.tag()
-        )));
+        return Err(root.error(format!("found <{}>; expected <scene version=\"3.0.0\">", root.tag())));
     }
     root.only(&["version"])?;
     let version = root.required("version")?;
     match version.text.split('.').next() {
         Some("2" | "3") => Ok(()),
-        _ => Err(version.error(format!(
-            "scene format {} is not supported; expected 2 or 3",
-            version.shown()
-        ))),
+        _ => Err(version.error(format!("scene format {} is not supported; expected 2 or 3", version.shown()))),
     }
 }
 
@@ -135,9 +112,7 @@ impl Reader {
     /// Reads an element of the scene.
     fn element(&mut self, element: Element<'_>) -> Result<(), LoadError> {
         match element.tag() {
-            "integrator" if self.max_depth.is_some() => {
-                Err(element.error("a scene can have one integrator only"))
-            }
+            "integrator" if self.max_depth.is_some() => Err(element.error("a scene can have one integrator only")),
             "integrator" => {
                 self.max_depth = Some(max_depth(element)?);
                 Ok(())
@@ -145,8 +120,7 @@ impl Reader {
             "sensor" => {
                 let sensor = sensor::read(element, self.size)?;
                 if self.sensor.is_some() {
-                    self.warnings
-                        .push("the scene has several sensors; the first one is used".to_owned());
+                    self.warnings.push("the scene has several sensors; the first one is used".to_owned());
                 }
                 self.sensor.get_or_insert(sensor);
                 Ok(())
@@ -155,16 +129,12 @@ impl Reader {
             "bsdf" => bsdf::read(element).map(drop),
             "emitter" => {
                 let shine = shine(element)?;
-                self.builder
-                    .emitter(shine)
-                    .map_err(|error| element.error(error.to_string()))
+                self.builder.emitter(shine).map_err(|error| element.error(error.to_string()))
             }
             "shape" => self.shape(element),
             other => {
                 let expected = error::one_of(&TAGS);
-                Err(element.error(format!(
-                    "unexpected <{other}> in the scene; expected {expected}"
-                )))
+                Err(element.error(format!("unexpected <{other}> in the scene; expected {expected}")))
             }
         }
     }
@@ -190,35 +160,23 @@ impl Reader {
             return Ok(*id);
         }
         let model: Bsdf = element.map_or(Ok(bsdf::default()), bsdf::read)?;
-        let id = self
-            .builder
-            .bsdf(if turned { bsdf::turned(model) } else { model });
+        let id = self.builder.bsdf(if turned { bsdf::turned(model) } else { model });
         self.bsdfs.insert(key, id);
         Ok(id)
     }
 
     fn finish(mut self, root: Element<'_>) -> Result<Loaded, LoadError> {
-        let (camera, film) = self
-            .sensor
-            .ok_or_else(|| root.error("this scene lacks a <sensor>"))?;
-        self.builder
-            .fingerprint(format!("{:?}", film.size).as_bytes());
+        let (camera, film) = self.sensor.ok_or_else(|| root.error("this scene lacks a <sensor>"))?;
+        self.builder.fingerprint(format!("{:?}", film.size).as_bytes());
         let max_depth = self.max_depth.unwrap_or(UNBOUNDED_DEPTH);
-        let scene = self
-            .builder
-            .build(camera, film, max_depth)
-            .map_err(|error| root.error(error.to_string()))?;
+        let scene = self.builder.build(camera, film, max_depth).map_err(|error| root.error(error.to_string()))?;
         if self.shapes == 0 {
             self.warnings.push("the scene has no shapes".to_owned());
         }
         if !scene.has_lights() {
-            self.warnings
-                .push("nothing in the scene shines: the image will be black".to_owned());
+            self.warnings.push("nothing in the scene shines: the image will be black".to_owned());
         }
-        Ok(Loaded {
-            scene,
-            warnings: self.warnings,
-        })
+        Ok(Loaded { scene, warnings: self.warnings })
     }
 }
 
@@ -227,25 +185,14 @@ fn max_depth(element: Element<'_>) -> Result<usize, LoadError> {
     let mut plugin = Plugin::new(element)?;
     let depth = plugin.integer("max_depth")?;
     let allowed = |depth: &i64| *depth == -1 || (1..=LARGEST_DEPTH as i64).contains(depth);
-    let depth = depth
-        .map(|d| d.check(allowed, &format!("-1 (no bound) or 1 to {LARGEST_DEPTH}")))
-        .transpose()?;
+    let depth = depth.map(|d| d.check(allowed, &format!("-1 (no bound) or 1 to {LARGEST_DEPTH}"))).transpose()?;
     if plugin.boolean("hide_emitters")? {
         return Err(element.error("`hide_emitters` is not supported; expected false"));
     }
     // These choose between estimators of the same image, or how work is divided.
-    plugin.ignore(&[
-        "rr_depth",
-        "samples_per_pass",
-        "timeout",
-        "block_size",
-        "emitter_samples",
-        "bsdf_samples",
-    ]);
+    plugin.ignore(&["rr_depth", "samples_per_pass", "timeout", "block_size", "emitter_samples", "bsdf_samples"]);
     plugin.finish()?;
-    Ok(depth
-        .and_then(|depth| usize::try_from(depth).ok())
-        .unwrap_or(UNBOUNDED_DEPTH))
+    Ok(depth.and_then(|depth| usize::try_from(depth).ok()).unwrap_or(UNBOUNDED_DEPTH))
 }
 
 /// Reads an emitter that is not a shape.
@@ -259,9 +206,7 @@ fn shine(element: Element<'_>) -> Result<Shine, LoadError> {
             let (to_world, transform) = plugin.to_world()?;
             let position = match plugin.point("position")? {
                 Some(_) if transform.tag() == "transform" => {
-                    return Err(transform.error(
-                        "a point emitter with both `position` and `to_world`; expected one",
-                    ));
+                    return Err(transform.error("a point emitter with both `position` and `to_world`; expected one"));
                 }
                 Some(position) => position,
                 None => to_world.translation,
@@ -269,8 +214,7 @@ fn shine(element: Element<'_>) -> Result<Shine, LoadError> {
             Shine::Point(position, intensity)
         }
         "area" => {
-            return Err(element
-                .error("an area emitter shines from a shape; expected it inside of a <shape>"));
+            return Err(element.error("an area emitter shines from a shape; expected it inside of a <shape>"));
         }
         _ => return Err(plugin.unknown(&["constant", "point", "area (in a shape)"])),
     };

@@ -12,34 +12,19 @@ const INDEX_LENGTH: usize = 11;
 /// Reads the mesh in `bytes`. Polygons become fans of triangles; points and lines are left out.
 pub(super) fn read(bytes: &[u8]) -> Result<RawMesh, String> {
     let geometry = geometry(bytes)?;
-    let options = tobj::LoadOptions {
-        single_index: true,
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
-    };
+    let options = tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
     let no_materials = |_: &std::path::Path| Ok(Default::default());
     let load = || tobj::load_obj_buf(&mut Cursor::new(&geometry), &options, no_materials);
     let (models, _) = guard(load)?.map_err(|error| error.to_string())?;
     let no_faces = || "it contains no faces".to_owned();
-    let model = models
-        .first()
-        .filter(|model| !model.mesh.indices.is_empty())
-        .ok_or_else(no_faces)?;
+    let model = models.first().filter(|model| !model.mesh.indices.is_empty()).ok_or_else(no_faces)?;
     let triples = |flat: &[f32]| -> Vec<DVec3> {
-        flat.chunks_exact(3)
-            .map(|c| DVec3::new(c[0].into(), c[1].into(), c[2].into()))
-            .collect()
+        flat.chunks_exact(3).map(|c| DVec3::new(c[0].into(), c[1].into(), c[2].into())).collect()
     };
     let mesh = RawMesh {
         positions: triples(&model.mesh.positions),
         normals: triples(&model.mesh.normals),
-        triangles: model
-            .mesh
-            .indices
-            .chunks_exact(3)
-            .map(|c| [c[0], c[1], c[2]])
-            .collect(),
+        triangles: model.mesh.indices.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),
     };
     if !mesh.normals.is_empty() && mesh.normals.len() != mesh.positions.len() {
         return Err("some faces have normals and others have none".to_owned());
@@ -53,9 +38,7 @@ fn geometry(bytes: &[u8]) -> Result<Vec<u8>, String> {
     // Vertices, texture coordinates and normals so far.
     let mut counts = [0; 3];
     for (index, line) in joined(bytes).split(|byte| *byte == b'\n').enumerate() {
-        let mut words = line
-            .split(u8::is_ascii_whitespace)
-            .filter(|word| !word.is_empty());
+        let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
         match words.next() {
             Some(b"v") => counts[0] += 1,
             Some(b"vt") => counts[1] += 1,
@@ -63,10 +46,7 @@ fn geometry(bytes: &[u8]) -> Result<Vec<u8>, String> {
             Some(b"f") => {
                 if let Some(word) = words.find(|word| !is_corner(word, counts)) {
                     let word = String::from_utf8_lossy(word);
-                    return Err(format!(
-                        "line {}: `{word}` is not a corner of a face",
-                        index + 1
-                    ));
+                    return Err(format!("line {}: `{word}` is not a corner of a face", index + 1));
                 }
             }
             _ => continue,
@@ -79,10 +59,7 @@ fn geometry(bytes: &[u8]) -> Result<Vec<u8>, String> {
 
 /// The text with lines that end in a backslash joined to the next, at the same line numbers.
 fn joined(bytes: &[u8]) -> Cow<'_, [u8]> {
-    if !bytes
-        .windows(2)
-        .any(|pair| pair == b"\\\n" || pair == b"\\\r")
-    {
+    if !bytes.windows(2).any(|pair| pair == b"\\\n" || pair == b"\\\r") {
         return Cow::Borrowed(bytes);
     }
     let mut text = Vec::with_capacity(bytes.len());
@@ -106,20 +83,13 @@ fn joined(bytes: &[u8]) -> Cow<'_, [u8]> {
 fn is_corner(word: &[u8], counts: [i64; 3]) -> bool {
     let parts: Vec<_> = word.split(|byte| *byte == b'/').collect();
     let valid = |(part, count): (&&[u8], i64)| {
-        let number = std::str::from_utf8(part)
-            .ok()
-            .filter(|text| text.len() <= INDEX_LENGTH);
+        let number = std::str::from_utf8(part).ok().filter(|text| text.len() <= INDEX_LENGTH);
         number
             .and_then(|text| text.parse::<i64>().ok())
             .is_some_and(|index| index > 0 || (index < 0 && -index <= count))
     };
     let empty_middle = parts.len() == 3 && parts[1].is_empty();
-    parts.len() <= 3
-        && parts
-            .iter()
-            .zip(counts)
-            .enumerate()
-            .all(|(i, part)| (i == 1 && empty_middle) || valid(part))
+    parts.len() <= 3 && parts.iter().zip(counts).enumerate().all(|(i, part)| (i == 1 && empty_middle) || valid(part))
 }
 
 #[cfg(test)]
@@ -143,32 +113,17 @@ mod tests {
             ("", "it contains no faces"),
             ("v 0 0\nf 1 1 1", "position parse error"),
             ("v 0 0 0\nf 1 1 2", "face vertex index out of bounds"),
-            (
-                "v 0 0 0\nf 1 1 -2",
-                "line 2: `-2` is not a corner of a face",
-            ),
-            (
-                "v 0 0 0\nv 0 0 0 \\\n\nf 1 0 1",
-                "line 4: `0` is not a corner of a face",
-            ),
-            (
-                "v 0 0 0\nf 1/1 1/-9223372036854775808 1",
-                "line 2: `1/-9223372036854775808` is not a corner of a face",
-            ),
+            ("v 0 0 0\nf 1 1 -2", "line 2: `-2` is not a corner of a face"),
+            ("v 0 0 0\nv 0 0 0 \\\n\nf 1 0 1", "line 4: `0` is not a corner of a face"),
+            ("v 0 0 0\nf 1/1 1/-9223372036854775808 1", "line 2: `1/-9223372036854775808` is not a corner of a face"),
             ("v 0 0 0\nf 1//1 1//1 1//1", "it contains no faces"),
-            (
-                "v 0 0 0\nvn 0 0 1\nf 1//1 1 1//1",
-                "some faces have normals and others have none",
-            ),
+            ("v 0 0 0\nvn 0 0 1\nf 1//1 1 1//1", "some faces have normals and others have none"),
         ];
         for (text, message) in cases {
             match read(text.as_bytes()) {
                 Err(found) => assert_eq!(found, message, "{text}"),
                 // Indices of normals that are not there are ignored where there are none at all.
-                Ok(mesh) => assert!(
-                    mesh.normals.is_empty() && text.contains("//1 1//1"),
-                    "{text}"
-                ),
+                Ok(mesh) => assert!(mesh.normals.is_empty() && text.contains("//1 1//1"), "{text}"),
             }
         }
     }

@@ -31,25 +31,14 @@ pub(super) struct Parameter<'a, T> {
 impl<'a, T> Parameter<'a, T> {
     /// The value, where `valid` accepts it.
     pub fn check(self, valid: impl FnOnce(&T) -> bool, expected: &str) -> Result<T, LoadError> {
-        if valid(&self.value) {
-            Ok(self.value)
-        } else {
-            Err(self.refuse(expected))
-        }
+        if valid(&self.value) { Ok(self.value) } else { Err(self.refuse(expected)) }
     }
 
     /// An error that says what was found and what was expected.
     pub fn refuse(&self, expected: &str) -> LoadError {
         match self.element.attribute("value") {
-            Some(text) => text.error(format!(
-                "`{}` is {}; expected {expected}",
-                self.name,
-                text.shown()
-            )),
-            None => self.element.error(format!(
-                "found another `{}`; expected {expected}",
-                self.name
-            )),
+            Some(text) => text.error(format!("`{}` is {}; expected {expected}", self.name, text.shown())),
+            None => self.element.error(format!("found another `{}`; expected {expected}", self.name)),
         }
     }
 }
@@ -64,52 +53,29 @@ impl<'a> Plugin<'a> {
             let Some(name) = child.attribute("name") else {
                 continue;
             };
-            let earlier = children[..index]
-                .iter()
-                .filter_map(|child| child.attribute("name"));
-            if earlier
-                .map(|earlier| earlier.text)
-                .any(|earlier| earlier == name.text)
-            {
+            let earlier = children[..index].iter().filter_map(|child| child.attribute("name"));
+            if earlier.map(|earlier| earlier.text).any(|earlier| earlier == name.text) {
                 return Err(name.error(format!("the parameter `{}` is given twice", name.text)));
             }
         }
-        Ok(Self {
-            element,
-            kind,
-            children,
-            asked: Vec::new(),
-        })
+        Ok(Self { element, kind, children, asked: Vec::new() })
     }
 
     /// An error that this kind of plugin is unknown.
     pub fn unknown(&self, expected: &[&str]) -> LoadError {
-        let message = format!(
-            "unknown {} `{}`; expected {}",
-            self.element.tag(),
-            self.kind,
-            one_of(expected)
-        );
+        let message = format!("unknown {} `{}`; expected {}", self.element.tag(), self.kind, one_of(expected));
         self.element.error(message)
     }
 
     /// An error that the parameter `name` is missing.
     pub fn lacks(&self, name: &str) -> LoadError {
-        self.element.error(format!(
-            "{} `{}` lacks the parameter `{name}`",
-            self.element.tag(),
-            self.kind
-        ))
+        self.element.error(format!("{} `{}` lacks the parameter `{name}`", self.element.tag(), self.kind))
     }
 
     /// Takes the parameter `name`, which must be one of `tags`.
     fn take(&mut self, name: &str, tags: &[&str]) -> Result<Option<Element<'a>>, LoadError> {
         self.asked.push(name.to_owned());
-        let named = |child: &Element<'_>| {
-            child
-                .attribute("name")
-                .is_some_and(|text| text.text == name)
-        };
+        let named = |child: &Element<'_>| child.attribute("name").is_some_and(|text| text.text == name);
         let Some(index) = self.children.iter().position(named) else {
             return Ok(None);
         };
@@ -118,11 +84,7 @@ impl<'a> Plugin<'a> {
             return Ok(Some(element));
         }
         let expected: Vec<_> = tags.iter().map(|tag| format!("<{tag}>")).collect();
-        Err(element.error(format!(
-            "`{name}` is a <{}>; expected {}",
-            element.tag(),
-            one_of(&expected)
-        )))
+        Err(element.error(format!("`{name}` is a <{}>; expected {}", element.tag(), one_of(&expected))))
     }
 
     fn scalar<T>(
@@ -135,11 +97,7 @@ impl<'a> Plugin<'a> {
             return Ok(None);
         };
         element.only(&["name", "value"])?;
-        Ok(Some(Parameter {
-            value: read(element.required("value")?)?,
-            name,
-            element,
-        }))
+        Ok(Some(Parameter { value: read(element.required("value")?)?, name, element }))
     }
 
     /// A finite number.
@@ -150,9 +108,7 @@ impl<'a> Plugin<'a> {
     /// A finite number above zero.
     pub fn positive(&mut self, name: &'static str) -> Result<Option<f64>, LoadError> {
         let value = self.float(name)?;
-        value
-            .map(|value| value.check(|value| *value > 0.0, "a number above 0"))
-            .transpose()
+        value.map(|value| value.check(|value| *value > 0.0, "a number above 0")).transpose()
     }
 
     /// A whole number.
@@ -162,24 +118,16 @@ impl<'a> Plugin<'a> {
 
     /// A truth value, `false` where it is not given.
     pub fn boolean(&mut self, name: &'static str) -> Result<bool, LoadError> {
-        Ok(self
-            .scalar(name, &["boolean"], |text| text.boolean())?
-            .is_some_and(|flag| flag.value))
+        Ok(self.scalar(name, &["boolean"], |text| text.boolean())?.is_some_and(|flag| flag.value))
     }
 
     /// A text.
-    pub fn string(
-        &mut self,
-        name: &'static str,
-    ) -> Result<Option<Parameter<'a, Text<'a>>>, LoadError> {
+    pub fn string(&mut self, name: &'static str) -> Result<Option<Parameter<'a, Text<'a>>>, LoadError> {
         self.scalar(name, &["string"], Ok)
     }
 
     /// A number, or a text.
-    pub fn float_or_string(
-        &mut self,
-        name: &'static str,
-    ) -> Result<Option<Parameter<'a, Text<'a>>>, LoadError> {
+    pub fn float_or_string(&mut self, name: &'static str) -> Result<Option<Parameter<'a, Text<'a>>>, LoadError> {
         self.scalar(name, &["float", "integer", "string"], Ok)
     }
 
@@ -205,25 +153,14 @@ impl<'a> Plugin<'a> {
     }
 
     /// A colour where a spectrum that is constant stands for grey: reflectances and refractive indices.
-    pub fn colour(
-        &mut self,
-        name: &'static str,
-    ) -> Result<Option<Parameter<'a, Spectrum>>, LoadError> {
+    pub fn colour(&mut self, name: &'static str) -> Result<Option<Parameter<'a, Spectrum>>, LoadError> {
         self.spectrum(name, Spectrum::ONE)
     }
 
     /// A share of light: a colour with channels from 0 to 1, 1 where it is not given.
     pub fn share(&mut self, name: &'static str, default: f64) -> Result<Spectrum, LoadError> {
-        let in_range = |colour: &Spectrum| {
-            colour
-                .to_rgb()
-                .iter()
-                .all(|channel| (0.0..=1.0).contains(channel))
-        };
-        let colour = self
-            .colour(name)?
-            .map(|colour| colour.check(in_range, "values from 0 to 1"))
-            .transpose()?;
+        let in_range = |colour: &Spectrum| colour.to_rgb().iter().all(|channel| (0.0..=1.0).contains(channel));
+        let colour = self.colour(name)?.map(|colour| colour.check(in_range, "values from 0 to 1")).transpose()?;
         Ok(colour.unwrap_or(Spectrum::grey(default)))
     }
 
@@ -232,17 +169,10 @@ impl<'a> Plugin<'a> {
     pub fn light(&mut self, name: &'static str) -> Result<Spectrum, LoadError> {
         let valid = |colour: &Spectrum| colour.is_valid();
         let light = self.spectrum(name, EQUAL_ENERGY)?;
-        Ok(light
-            .map(|light| light.check(valid, "values of at least 0"))
-            .transpose()?
-            .unwrap_or(Spectrum::ONE))
+        Ok(light.map(|light| light.check(valid, "values of at least 0")).transpose()?.unwrap_or(Spectrum::ONE))
     }
 
-    fn spectrum(
-        &mut self,
-        name: &'static str,
-        white: Spectrum,
-    ) -> Result<Option<Parameter<'a, Spectrum>>, LoadError> {
+    fn spectrum(&mut self, name: &'static str, white: Spectrum) -> Result<Option<Parameter<'a, Spectrum>>, LoadError> {
         let Some(element) = self.take(name, &["rgb", "spectrum", "float"])? else {
             return Ok(None);
         };
@@ -253,20 +183,13 @@ impl<'a> Plugin<'a> {
             "spectrum" => white * text.constant_spectrum()?,
             _ => Spectrum::grey(text.number()?),
         };
-        Ok(Some(Parameter {
-            value,
-            name,
-            element,
-        }))
+        Ok(Some(Parameter { value, name, element }))
     }
 
     /// Takes all nested elements `tag`; references are followed.
     pub fn objects(&mut self, tag: &str) -> Result<Vec<Element<'a>>, LoadError> {
         self.asked.push(format!("<{tag}>"));
-        let (mine, rest) = self
-            .children
-            .drain(..)
-            .partition(|child| [tag, "ref"].contains(&child.tag()));
+        let (mine, rest) = self.children.drain(..).partition(|child| [tag, "ref"].contains(&child.tag()));
         self.children = rest;
         let follow = |child: Element<'a>| {
             if child.tag() != "ref" {
@@ -276,10 +199,7 @@ impl<'a> Plugin<'a> {
             if target.tag() == tag {
                 return Ok(target);
             }
-            Err(child.error(format!(
-                "this refers to a <{}>; expected a <{tag}>",
-                target.tag()
-            )))
+            Err(child.error(format!("this refers to a <{}>; expected a <{tag}>", target.tag())))
         };
         Vec::into_iter(mine).map(follow).collect()
     }
@@ -290,21 +210,13 @@ impl<'a> Plugin<'a> {
         match objects[..] {
             [] => Ok(None),
             [one] => Ok(Some(one)),
-            [_, second, ..] => Err(second.error(format!(
-                "a second <{tag}> in {} `{}`",
-                self.element.tag(),
-                self.kind
-            ))),
+            [_, second, ..] => Err(second.error(format!("a second <{tag}> in {} `{}`", self.element.tag(), self.kind))),
         }
     }
 
     /// Drops parameters that cannot change the image.
     pub fn ignore(&mut self, names: &[&str]) {
-        let harmless = |child: &Element<'_>| {
-            child
-                .attribute("name")
-                .is_some_and(|name| names.contains(&name.text))
-        };
+        let harmless = |child: &Element<'_>| child.attribute("name").is_some_and(|name| names.contains(&name.text));
         self.children.retain(|child| !harmless(child));
     }
 
@@ -318,8 +230,6 @@ impl<'a> Plugin<'a> {
             None => format!("<{}>", child.tag()),
         };
         let (tag, kind, expected) = (self.element.tag(), self.kind, one_of(&self.asked));
-        Err(child.error(format!(
-            "unreferenced {found} in {tag} `{kind}`; expected {expected}"
-        )))
+        Err(child.error(format!("unreferenced {found} in {tag} `{kind}`; expected {expected}")))
     }
 }

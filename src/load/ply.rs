@@ -4,9 +4,7 @@ use super::guard;
 use super::mesh::RawMesh;
 use glam::DVec3;
 use ply_rs_bw::parser::{Parser, Reader};
-use ply_rs_bw::ply::{
-    ElementDef, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType,
-};
+use ply_rs_bw::ply::{ElementDef, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType};
 use std::io::Cursor;
 
 /// Names that files use for the corners of a face.
@@ -83,99 +81,58 @@ pub(super) fn read(bytes: &[u8]) -> Result<RawMesh, String> {
 fn parse(bytes: &[u8]) -> Result<RawMesh, String> {
     let mut reader = Reader::new(Cursor::new(bytes));
     let one_line = |error: ply_rs_bw::parser::ParseError| error.to_string().replace("\n\t", " ");
-    let header = Parser::<Vertex>::new()
-        .read_header(&mut reader)
-        .map_err(one_line)?;
+    let header = Parser::<Vertex>::new().read_header(&mut reader).map_err(one_line)?;
     let has_normals = check(&header, bytes.len())?;
     let mut mesh = RawMesh::default();
     for (name, element) in &header.elements {
         match name.as_str() {
             "vertex" => {
                 let parser = Parser::<Vertex>::new();
-                let vertices = parser
-                    .read_payload_for_element(&mut reader, element, &header)
-                    .map_err(one_line)?;
-                mesh.positions = vertices
-                    .iter()
-                    .map(|vertex| DVec3::from(vertex.position))
-                    .collect();
+                let vertices = parser.read_payload_for_element(&mut reader, element, &header).map_err(one_line)?;
+                mesh.positions = vertices.iter().map(|vertex| DVec3::from(vertex.position)).collect();
                 if has_normals {
-                    mesh.normals = vertices
-                        .iter()
-                        .map(|vertex| DVec3::from(vertex.normal))
-                        .collect();
+                    mesh.normals = vertices.iter().map(|vertex| DVec3::from(vertex.normal)).collect();
                 }
             }
             "face" => {
                 let parser = Parser::<Face>::new();
-                let faces = parser
-                    .read_payload_for_element(&mut reader, element, &header)
-                    .map_err(one_line)?;
+                let faces = parser.read_payload_for_element(&mut reader, element, &header).map_err(one_line)?;
                 mesh.triangles = faces.iter().flat_map(|face| fan(&face.corners)).collect();
             }
             _ => {
                 let parser = Parser::<Other>::new();
-                parser
-                    .read_payload_for_element(&mut reader, element, &header)
-                    .map_err(one_line)?;
+                parser.read_payload_for_element(&mut reader, element, &header).map_err(one_line)?;
             }
         }
     }
-    match mesh
-        .triangles
-        .iter()
-        .flatten()
-        .find(|index| **index as usize >= mesh.positions.len())
-    {
-        Some(index) => Err(format!(
-            "a face refers to vertex {index} of {}",
-            mesh.positions.len()
-        )),
+    match mesh.triangles.iter().flatten().find(|index| **index as usize >= mesh.positions.len()) {
+        Some(index) => Err(format!("a face refers to vertex {index} of {}", mesh.positions.len())),
         None if mesh.triangles.is_empty() => Err("it contains no faces".to_owned()),
         None => Ok(mesh),
     }
 }
 
 fn fan(corners: &[u32]) -> impl Iterator<Item = [u32; 3]> {
-    corners
-        .windows(2)
-        .skip(1)
-        .map(|pair| [corners[0], pair[0], pair[1]])
+    corners.windows(2).skip(1).map(|pair| [corners[0], pair[0], pair[1]])
 }
 
 /// Refuses a header without vertices or faces, or with more elements than the file has bytes; whether it has normals.
 fn check(header: &Header, bytes: usize) -> Result<bool, String> {
-    let element = |name: &str| {
-        header
-            .elements
-            .get(name)
-            .ok_or_else(|| format!("it has no element `{name}`"))
-    };
+    let element = |name: &str| header.elements.get(name).ok_or_else(|| format!("it has no element `{name}`"));
     let (vertex, face) = (element("vertex")?, element("face")?);
-    let has = |names: &[&str], element: &ElementDef| {
-        names
-            .iter()
-            .all(|name| element.properties.contains_key(*name))
-    };
+    let has = |names: &[&str], element: &ElementDef| names.iter().all(|name| element.properties.contains_key(*name));
     if !has(&["x", "y", "z"], vertex) {
         return Err("its vertices lack one of x, y, z".to_owned());
     }
     let is_list = |name: &&str| {
-        face.properties
-            .get(*name)
-            .is_some_and(|corners| matches!(corners.data_type, PropertyType::List(..)))
+        face.properties.get(*name).is_some_and(|corners| matches!(corners.data_type, PropertyType::List(..)))
     };
     if !CORNERS.iter().any(is_list) {
         return Err("its faces lack the list `vertex_indices`".to_owned());
     }
-    let count = header
-        .elements
-        .values()
-        .fold(0usize, |sum, element| sum.saturating_add(element.count));
+    let count = header.elements.values().fold(0usize, |sum, element| sum.saturating_add(element.count));
     if count > bytes {
-        return Err(format!(
-            "its header promises {count} elements, more than its {bytes} bytes can hold"
-        ));
+        return Err(format!("its header promises {count} elements, more than its {bytes} bytes can hold"));
     }
     Ok(has(&["nx", "ny", "nz"], vertex))
 }
@@ -194,21 +151,9 @@ mod tests {
     }
 
     fn binary(little: bool) -> Vec<u8> {
-        let mut bytes = header(
-            if little {
-                "binary_little_endian"
-            } else {
-                "binary_big_endian"
-            },
-            5,
-        )
-        .into_bytes();
+        let mut bytes = header(if little { "binary_little_endian" } else { "binary_big_endian" }, 5).into_bytes();
         let mut put = |little_endian: &[u8]| {
-            if little {
-                bytes.extend(little_endian)
-            } else {
-                bytes.extend(little_endian.iter().rev())
-            }
+            if little { bytes.extend(little_endian) } else { bytes.extend(little_endian.iter().rev()) }
         };
         for [x, y, z] in POINTS {
             put(&(x as f32).to_le_bytes());
@@ -223,20 +168,13 @@ mod tests {
         bytes
     }
 
-    const POINTS: [[f64; 3]; 5] = [
-        [0.0, 0.0, 0.0],
-        [1.0, 0.0, 0.0],
-        [1.0, 1.0, 0.5],
-        [0.0, 1.0, 0.0],
-        [0.5, 2.0, -3.0],
-    ];
+    const POINTS: [[f64; 3]; 5] =
+        [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.5], [0.0, 1.0, 0.0], [0.5, 2.0, -3.0]];
 
     #[test]
     fn all_encodings_are_read() {
         let mut ascii = header("ascii", 5);
-        POINTS
-            .iter()
-            .for_each(|[x, y, z]| ascii += &format!("{x} {y} {z}\n"));
+        POINTS.iter().for_each(|[x, y, z]| ascii += &format!("{x} {y} {z}\n"));
         ascii += "9 4 0 1 2 3\n9 3 3 2 4\n";
         for bytes in [ascii.into_bytes(), binary(true), binary(false)] {
             let mesh = read(&bytes).unwrap();
@@ -250,20 +188,11 @@ mod tests {
     fn bad_files_are_explained() {
         let short = |count| header("ascii", count);
         let cases: [(String, &str); 5] = [
-            (
-                short(1) + "0 0 0\n0 3 0 0 0\n0 3 0 0 1\n",
-                "a face refers to vertex 1 of 1",
-            ),
+            (short(1) + "0 0 0\n0 3 0 0 0\n0 3 0 0 1\n", "a face refers to vertex 1 of 1"),
             (short(1) + "0 0 0\n0 3 0 0 -1\n", "Line 11"),
-            (
-                short(9_999_999_999),
-                "its header promises 10000000001 elements",
-            ),
+            (short(9_999_999_999), "its header promises 10000000001 elements"),
             (short(3), "Line 10: Unexpected end of file"),
-            (
-                "ply\nformat ascii 1.0\nelement vertex 0\nend_header\n".into(),
-                "it has no element `face`",
-            ),
+            ("ply\nformat ascii 1.0\nelement vertex 0\nend_header\n".into(), "it has no element `face`"),
         ];
         for (text, message) in cases {
             let found = read(text.as_bytes()).err().unwrap();

@@ -18,9 +18,7 @@ pub(super) fn read(element: Element<'_>) -> Result<DAffine3, LoadError> {
             "lookat" => look_at(step)?,
             other => {
                 let expected = "translate, scale, rotate, matrix, lookat";
-                return Err(step.error(format!(
-                    "unknown transformation <{other}>; expected one of {expected}"
-                )));
+                return Err(step.error(format!("unknown transformation <{other}>; expected one of {expected}")));
             }
         } * whole;
     }
@@ -29,9 +27,7 @@ pub(super) fn read(element: Element<'_>) -> Result<DAffine3, LoadError> {
         return Err(element.error("this transformation is too large to compute with"));
     }
     if determinant == 0.0 {
-        return Err(
-            element.error("this transformation flattens space; expected one that can be undone")
-        );
+        return Err(element.error("this transformation flattens space; expected one that can be undone"));
     }
     Ok(whole)
 }
@@ -39,16 +35,8 @@ pub(super) fn read(element: Element<'_>) -> Result<DAffine3, LoadError> {
 /// Matrix that takes normals of surfaces to their world space, up to a positive factor: the inverse transpose. It is
 /// formed from cofactors, which stay finite however small the transformation is.
 pub(super) fn normal_matrix(transform: &DAffine3) -> DMat3 {
-    let DMat3 {
-        x_axis,
-        y_axis,
-        z_axis,
-    } = transform.matrix3;
-    let cofactors = DMat3::from_cols(
-        y_axis.cross(z_axis),
-        z_axis.cross(x_axis),
-        x_axis.cross(y_axis),
-    );
+    let DMat3 { x_axis, y_axis, z_axis } = transform.matrix3;
+    let cofactors = DMat3::from_cols(y_axis.cross(z_axis), z_axis.cross(x_axis), x_axis.cross(y_axis));
     cofactors * transform.matrix3.determinant().signum()
 }
 
@@ -58,18 +46,14 @@ fn axes(step: Element<'_>, default: f64, others: &[&str]) -> Result<DVec3, LoadE
     if let Some(value) = step.attribute("value") {
         return value.triple();
     }
-    let axis = |name| {
-        step.attribute(name)
-            .map_or(Ok(default), |text| text.number())
-    };
+    let axis = |name| step.attribute(name).map_or(Ok(default), |text| text.number());
     Ok(DVec3::new(axis("x")?, axis("y")?, axis("z")?))
 }
 
 /// Rotation about an axis of any length.
 fn rotate(step: Element<'_>) -> Result<DAffine3, LoadError> {
     let axis = axes(step, 0.0, &["angle"])?.try_normalize();
-    let axis =
-        axis.ok_or_else(|| step.error("<rotate> has no axis; expected x, y or z other than 0"))?;
+    let axis = axis.ok_or_else(|| step.error("<rotate> has no axis; expected x, y or z other than 0"))?;
     let angle = step.required("angle")?.number()?.to_radians();
     Ok(DAffine3::from_quat(DQuat::from_axis_angle(axis, angle)))
 }
@@ -78,15 +62,15 @@ fn matrix(step: Element<'_>) -> Result<DAffine3, LoadError> {
     step.only(&["value"])?;
     let text = step.required("value")?;
     let rows = text.numbers()?;
-    let cells = |stride: usize| {
-        DMat3::from_cols_array_2d(&[0, 1, 2].map(|c| [0, 1, 2].map(|r| rows[r * stride + c])))
-    };
+    let cells = |stride: usize| DMat3::from_cols_array_2d(&[0, 1, 2].map(|c| [0, 1, 2].map(|r| rows[r * stride + c])));
     match rows.len() {
         9 => Ok(DAffine3::from_mat3(cells(3))),
         16 if rows[12..] == [0.0, 0.0, 0.0, 1.0] => {
             Ok(DAffine3::from_mat3_translation(cells(4), DVec3::new(rows[3], rows[7], rows[11])))
         }
-        16 => Err(text.error("the last row of this matrix is not 0 0 0 1; perspective transformations are not supported")),
+        16 => {
+            Err(text.error("the last row of this matrix is not 0 0 0 1; perspective transformations are not supported"))
+        }
         count => Err(text.error(format!("found {count} numbers; expected 16, or 9 without translation"))),
     }
 }
@@ -102,15 +86,7 @@ fn look_at(step: Element<'_>) -> Result<DAffine3, LoadError> {
         Some(text) => text.triple()?,
         None => Frame::around(direction).tangent,
     };
-    let left = up
-        .cross(direction)
-        .try_normalize()
-        .filter(|_| up.normalize_or_zero().cross(direction).length() > 1e-12);
-    let left = left.ok_or_else(|| {
-        step.error("<lookat> looks along `up`; expected another direction for `up`")
-    })?;
-    Ok(DAffine3::from_mat3_translation(
-        DMat3::from_cols(left, direction.cross(left), direction),
-        origin,
-    ))
+    let left = up.cross(direction).try_normalize().filter(|_| up.normalize_or_zero().cross(direction).length() > 1e-12);
+    let left = left.ok_or_else(|| step.error("<lookat> looks along `up`; expected another direction for `up`"))?;
+    Ok(DAffine3::from_mat3_translation(DMat3::from_cols(left, direction.cross(left), direction), origin))
 }

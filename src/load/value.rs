@@ -43,9 +43,7 @@ impl Text<'_> {
 
     /// A whole number.
     pub fn integer(&self) -> Result<i64, LoadError> {
-        self.text
-            .parse()
-            .map_err(|_| self.expected("a whole number"))
+        self.text.parse().map_err(|_| self.expected("a whole number"))
     }
 
     /// `true` or `false`, in upper or lower case.
@@ -59,14 +57,8 @@ impl Text<'_> {
 
     /// Finite numbers between commas or blanks.
     pub fn numbers(&self) -> Result<Vec<f64>, LoadError> {
-        let words = self
-            .text
-            .split(|c: char| c == ',' || c.is_whitespace())
-            .filter(|word| !word.is_empty());
-        words
-            .map(number)
-            .collect::<Option<_>>()
-            .ok_or_else(|| self.expected("finite numbers"))
+        let words = self.text.split(|c: char| c == ',' || c.is_whitespace()).filter(|word| !word.is_empty());
+        words.map(number).collect::<Option<_>>().ok_or_else(|| self.expected("finite numbers"))
     }
 
     /// Three numbers, or one for all three.
@@ -84,12 +76,8 @@ impl Text<'_> {
             let [r, g, b] = self.triple()?.to_array();
             return Ok(Spectrum::rgb(r, g, b));
         };
-        let code = u32::from_str_radix(digits, 16)
-            .ok()
-            .filter(|_| digits.len() == 6);
-        let [_, r, g, b] = code
-            .ok_or_else(|| self.expected("#RRGGBB in hexadecimal digits"))?
-            .to_be_bytes();
+        let code = u32::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 6);
+        let [_, r, g, b] = code.ok_or_else(|| self.expected("#RRGGBB in hexadecimal digits"))?.to_be_bytes();
         Ok(Spectrum::rgb(r.into(), g.into(), b.into()) / 255.0)
     }
 
@@ -112,36 +100,18 @@ mod tests {
     use super::*;
 
     fn with<R>(text: &str, read: impl FnOnce(Text<'_>) -> R) -> R {
-        let source = Source {
-            path: "x".into(),
-            text: text.to_owned(),
-        };
-        read(Text {
-            text: &source.text,
-            offset: 0,
-            source: &source,
-        })
+        let source = Source { path: "x".into(), text: text.to_owned() };
+        read(Text { text: &source.text, offset: 0, source: &source })
     }
 
     #[test]
     fn colours_have_four_forms() {
         for text in ["0.2, 0.4 ,0.6", "0.2 0.4\n0.6", "#336699"] {
             let rgb = with(text, |text| text.colour()).unwrap().to_rgb();
-            assert!(
-                rgb.iter()
-                    .zip([0.2, 0.4, 0.6])
-                    .all(|(a, b)| (a - b).abs() < 1e-12),
-                "{text}: {rgb:?}"
-            );
+            assert!(rgb.iter().zip([0.2, 0.4, 0.6]).all(|(a, b)| (a - b).abs() < 1e-12), "{text}: {rgb:?}");
         }
-        assert_eq!(
-            with("0.3", |text| text.colour()).unwrap(),
-            Spectrum::grey(0.3)
-        );
-        for text in [
-            "", "1 2", "1 2 3 4", "1;2;3", "nan", "1 inf 1", "1e999", "#12345", "#12345é",
-            "#+12345",
-        ] {
+        assert_eq!(with("0.3", |text| text.colour()).unwrap(), Spectrum::grey(0.3));
+        for text in ["", "1 2", "1 2 3 4", "1;2;3", "nan", "1 inf 1", "1e999", "#12345", "#12345é", "#+12345"] {
             assert!(with(text, |text| text.colour()).is_err(), "{text}");
         }
     }
