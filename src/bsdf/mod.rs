@@ -130,13 +130,14 @@ impl Bsdf {
         }
     }
 
-    /// Whether all lobes are Dirac densities, so that no connection can be made at this surface.
+    /// Whether all lobes for light from `wi` are Dirac densities, so that no connection can be made there.
     #[inline]
-    pub fn is_delta(&self) -> bool {
+    pub fn is_delta(&self, wi: DVec3) -> bool {
         match self {
             Self::Diffuse(_) | Self::RoughConductor(_) => false,
             Self::Conductor(_) | Self::Dielectric(_) => true,
-            Self::TwoSided(sides) => sides.iter().all(Self::is_delta),
+            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].is_delta(wi),
+            Self::TwoSided(sides) => sides[1].is_delta(flip(wi)),
         }
     }
 

@@ -109,7 +109,7 @@ impl Word {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::is_layer_name;
+    use crate::image::check_layer_name;
     use Letter::{D, S};
     use std::collections::HashSet;
 
@@ -128,7 +128,7 @@ mod tests {
     fn every_class_has_its_own_layer_name() {
         let names: HashSet<String> = PathClass::all().map(PathClass::layer_name).collect();
         assert_eq!(names.len(), CLASSES);
-        assert!(names.iter().all(|name| is_layer_name(name)));
+        assert!(names.iter().all(|name| check_layer_name(name).is_ok()));
     }
 
     #[test]

@@ -30,6 +30,15 @@ pub struct Health {
     pub negative: u64,
 }
 
+impl std::fmt::Display for Health {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if *self == Self::default() {
+            return f.write_str("all contributions valid");
+        }
+        write!(f, "left out {} contributions that were not finite and {} negative ones", self.nonfinite, self.negative)
+    }
+}
+
 impl Health {
     /// Adds the counts of another job.
     pub fn add(&mut self, other: &Self) {

@@ -1,31 +1,22 @@
-//! Images (stand-in until the room is furnished).
-use ndarray::{Array2, Array3};
-use std::collections::BTreeMap;
-/// A layer.
-#[derive(Clone, Debug)]
-pub enum Layer {
-    /// One channel.
-    Luminance(Array2<f32>),
-    /// Three channels.
-    Colour(Array3<f32>),
-}
-/// An image.
-#[derive(Clone, Debug)]
-pub struct Image {
-    /// Height × width × 3.
-    pub colour: Array3<f32>,
-    /// Layers.
-    pub layers: BTreeMap<String, Layer>,
-    /// Manifest.
-    pub manifest: serde_json::Map<String, serde_json::Value>,
-}
-impl Image {
-    /// Black.
-    pub fn new(w: usize, h: usize) -> Self {
-        Self { colour: Array3::zeros((h, w, 3)), layers: BTreeMap::new(), manifest: Default::default() }
-    }
-}
-/// Whether a name is a layer name.
-pub fn is_layer_name(name: &str) -> bool {
-    !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
-}
+//! Images: linear colour with named float layers, their files, and how far two of them are apart.
+//!
+//! [`Image`] is what every stage hands to the next: a renderer develops its film into one, the blender
+//! reads several and writes one. It lives in multi-layer OpenEXR files ([`Image::read`], [`Image::write`]);
+//! [`write_png`] and [`write_false_colour`] make pictures to look at, and [`metrics::compare`] measures.
+
+mod colour_map;
+mod error;
+mod exr;
+mod layers;
+pub mod metrics;
+mod png;
+mod srgb;
+mod whole;
+
+pub use colour_map::diverging;
+pub use error::ImageError;
+pub use exr::{Precision, WriteOptions, layers_path};
+pub use layers::{INTEGRATOR_KEY, Image, LUMINANCE_WEIGHTS, Layer, SCENE_KEY, check_layer_name, luminance};
+pub use png::{write_false_colour, write_png};
+pub use srgb::{encode as srgb_encode, to_srgb8};
+pub use whole::write_whole;

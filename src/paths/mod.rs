@@ -5,12 +5,15 @@
 //! all integrators; they differ in where the rows of primary samples come from.
 
 mod connect;
+mod direct;
 mod mis;
 mod rows;
 mod subpath;
 mod trace;
 
 pub use connect::{Connection, connect};
-pub use rows::{Fixed, Random, Rows};
+pub use direct::{Direct, direct_pdf, sample_direct};
+pub use mis::Heuristic;
+pub use rows::{Random, Rows};
 pub use subpath::{Subpath, Vertex, VertexKind};
-pub use trace::{trace_camera, trace_light};
+pub use trace::{light_vertex, shading_correction, trace_camera, trace_light};

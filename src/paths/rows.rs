@@ -30,18 +30,3 @@ impl Rows for Random<'_> {
         true
     }
 }
-
-/// The rows of a Markov chain's state. Its paths have a given length, so that they are never ended at random.
-pub struct Fixed<'a>(pub &'a [Row]);
-
-impl Rows for Fixed<'_> {
-    #[inline]
-    fn row(&mut self, index: usize) -> Row {
-        self.0[index]
-    }
-
-    #[inline]
-    fn roulette(&self) -> bool {
-        false
-    }
-}

@@ -1,19 +1,19 @@
 //! Random walks.
 
-use super::subpath::{Subpath, Vertex, VertexKind};
 use super::rows::Rows;
+use super::subpath::{Subpath, Vertex, VertexKind};
 use crate::emitter::{Emitter, Start};
 use crate::film::Word;
-use crate::geometry::Ray;
+use crate::geometry::offset::OFFSET;
 use crate::math::{AreaPdf, Row, SolidAnglePdf, Walk};
-use crate::scene::{Scene, Surface};
+use crate::scene::{Caster, EmitterId, Surface};
 use crate::spectrum::Spectrum;
 use glam::{DVec2, DVec3};
 
 /// Walks from the camera through the film position `film`, up to `vertices` vertices. `rows.row(0)` must have been
 /// read by the caller, who made `film` of it, and is passed as `first`.
 pub fn trace_camera(
-    scene: &Scene,
+    scene: &Caster<'_>,
     film: DVec2,
     first: Row,
     rows: &mut impl Rows,
@@ -41,18 +41,44 @@ pub fn trace_camera(
 }
 
 /// Walks from a light, up to `vertices` vertices, of which the first lies on the light.
-pub fn trace_light(scene: &Scene, rows: &mut impl Rows, vertices: usize, roulette_from: usize, path: &mut Subpath) {
+pub fn trace_light(
+    scene: &Caster<'_>,
+    rows: &mut impl Rows,
+    vertices: usize,
+    roulette_from: usize,
+    path: &mut Subpath,
+) {
     path.vertices.clear();
     if vertices == 0 {
         return;
     }
-    let Some((id, start, pdf)) = scene.sample_start(rows.row(0)) else { return };
-    let (position, offset_normal) = match start {
-        Start::Surface { position, normal } => (position, normal),
-        Start::Point { position } => (position, DVec3::ZERO),
-        Start::Infinite { .. } => (DVec3::ZERO, DVec3::ZERO),
+    let Some(vertex) = light_vertex(scene, rows.row(0)) else { return };
+    path.vertices.push(vertex);
+    let VertexKind::Light(id, start) = vertex.kind else { return };
+    if vertices == 1 {
+        return;
+    }
+    let Some((origin, direction, weight)) = scene.emitter(id).emit(&start, rows.row(1)) else { return };
+    let normal = if let Start::Surface { normal, .. } = start { normal } else { DVec3::ZERO };
+    let walker = Walker {
+        origin: origin + normal * light_offset(origin),
+        direction,
+        throughput: weight * vertex.throughput,
+        pdf: SolidAnglePdf(0.0),
+        word: Word::EMPTY,
     };
-    path.vertices.push(Vertex {
+    walk(scene, walker, Walk::FromLight, rows, vertices, roulette_from, path);
+}
+
+/// The first vertex of a walk from a light, or the only one of a light subpath for direct light.
+#[inline]
+pub fn light_vertex(scene: &Caster<'_>, row: Row) -> Option<Vertex> {
+    let (id, start, pdf) = scene.sample_start(row)?;
+    let position = match start {
+        Start::Surface { position, .. } | Start::Point { position } => position,
+        Start::Infinite { .. } => DVec3::ZERO,
+    };
+    Some(Vertex {
         kind: VertexKind::Light(id, start),
         position,
         back: DVec3::ZERO,
@@ -61,26 +87,13 @@ pub fn trace_light(scene: &Scene, rows: &mut impl Rows, vertices: usize, roulett
         reverse: AreaPdf(0.0),
         delta: false,
         word: Word::EMPTY,
-    });
-    if vertices == 1 {
-        return;
-    }
-    let emitter = scene.emitter(id);
-    let Some((origin, direction, weight)) = emitter.emit(&start, rows.row(1)) else { return };
-    let walker = Walker {
-        origin: origin + offset_normal * light_offset(origin),
-        direction,
-        throughput: weight / pdf.0,
-        pdf: SolidAnglePdf(0.0),
-        word: Word::EMPTY,
-    };
-    walk(scene, walker, Walk::FromLight, rows, vertices, roulette_from, path);
+    })
 }
 
 /// Distance by which rays are started off a light at `position`.
 #[inline]
 pub(super) fn light_offset(position: DVec3) -> f64 {
-    4e-12 * position.abs().max_element()
+    4.0 * OFFSET * position.abs().max_element()
 }
 
 /// The end of a walk that goes on.
@@ -95,7 +108,7 @@ struct Walker {
 
 /// Extends `path`, whose first vertex is there, by `walker` and what it meets.
 fn walk(
-    scene: &Scene,
+    scene: &Caster<'_>,
     mut walker: Walker,
     mode: Walk,
     rows: &mut impl Rows,
@@ -105,10 +118,10 @@ fn walk(
 ) {
     // Both walks read row i at vertex i; from a light, row 1 went into the emission, so scattering is one row later.
     let row_shift = usize::from(mode == Walk::FromLight);
+    let mut alive = 1.0;
     while path.vertices.len() < vertices {
         let last = path.vertices.len() - 1;
-        let ray = Ray { origin: walker.origin, direction: walker.direction, tmax: f64::INFINITY };
-        let Some(surface) = scene.intersect(&ray) else {
+        let Some(surface) = scene.intersect(walker.origin, walker.direction) else {
             if let (Walk::FromCamera, Some(id)) = (mode, scene.environment()) {
                 path.vertices.push(environment_vertex(id, &walker));
             }
@@ -124,12 +137,15 @@ fn walk(
         let Some(scatter) = scene.bsdf(surface.bsdf).sample(wi, row, mode) else { return };
         let direction = surface.frame.to_world(scatter.direction);
         let mut weight = scatter.weight * shading_correction(&surface, vertex.back, direction, mode);
+        // What remains of the walk's power; radiance that was squeezed by refraction is no loss.
+        alive *= weight.max_element() * if mode == Walk::FromCamera { scatter.eta * scatter.eta } else { 1.0 };
         if rows.roulette() && last + 1 >= roulette_from {
-            let survival = (weight.max_element() * scatter.eta * scatter.eta).min(0.95);
+            let survival = alive.min(0.95);
             if row[3] >= survival {
                 return;
             }
             weight = weight / survival;
+            alive /= survival;
         }
         if weight.is_black() {
             return;
@@ -149,7 +165,7 @@ fn walk(
     }
 }
 
-fn environment_vertex(id: crate::scene::EmitterId, walker: &Walker) -> Vertex {
+fn environment_vertex(id: EmitterId, walker: &Walker) -> Vertex {
     Vertex {
         kind: VertexKind::Environment(id),
         position: walker.origin,
@@ -163,7 +179,7 @@ fn environment_vertex(id: crate::scene::EmitterId, walker: &Walker) -> Vertex {
 }
 
 #[inline]
-fn surface_vertex(scene: &Scene, surface: &Surface, walker: &Walker, previous: &Vertex) -> Vertex {
+fn surface_vertex(scene: &Caster<'_>, surface: &Surface, walker: &Walker, previous: &Vertex) -> Vertex {
     let cos = surface.geometric.dot(walker.direction);
     let distance_squared = (surface.position - previous.position).length_squared();
     let forward = match &previous.kind {
@@ -177,7 +193,7 @@ fn surface_vertex(scene: &Scene, surface: &Surface, walker: &Walker, previous: &
         throughput: walker.throughput,
         forward,
         reverse: AreaPdf(0.0),
-        delta: scene.bsdf(surface.bsdf).is_delta(),
+        delta: scene.bsdf(surface.bsdf).is_delta(surface.frame.to_local(-walker.direction)),
         word: walker.word,
     }
 }
@@ -198,7 +214,7 @@ pub(super) fn reverse_pdf(vertex: &Vertex, next: &Vertex, pdf: SolidAnglePdf) ->
 /// |ω_i·n_s| |ω_o·n_g| / (|ω_i·n_g| |ω_o·n_s|) with ω_i back along the walk; the cosine with the shading normal that
 /// the sampling weight holds is |ω_o·n_s|.
 #[inline]
-pub(super) fn shading_correction(surface: &Surface, back: DVec3, onward: DVec3, mode: Walk) -> f64 {
+pub fn shading_correction(surface: &Surface, back: DVec3, onward: DVec3, mode: Walk) -> f64 {
     if mode == Walk::FromCamera || surface.frame.normal == surface.geometric {
         return 1.0;
     }

@@ -1,11 +1,11 @@
 //! Assembles a [`Scene`] from what a file says.
 
-use super::{BsdfId, EmitterId, Scene, Shape};
+use super::{BsdfId, EmitterId, Face, Scene, Shape};
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::emitter::{Area, Constant, Emitter, Surface};
 use crate::film::Filter;
-use crate::geometry::{Bvh, Solid};
+use crate::geometry::{Bvh, Solid, geometric_normal, offset};
 use crate::math::Discrete;
 use crate::spectrum::Spectrum;
 use glam::{DVec3, Vec3};
@@ -163,11 +163,20 @@ impl Builder {
         self.hasher.update(bytes);
     }
 
+    /// Triangles without area have no normal; no ray hits them.
+    fn face(&self, triangle: &[u32; 3]) -> Face {
+        let [a, b, c] = triangle.map(|i| self.vertices[i as usize].as_dvec3());
+        Face { normal: geometric_normal(a, b, c).unwrap_or(DVec3::Z), offset: offset::of_triangle(a, b, c) }
+    }
+
     /// The scene as seen by `camera`. Builds the acceleration structure.
     pub fn build(mut self, camera: Camera, film: FilmSpec, max_depth: usize) -> Result<Scene, SceneError> {
         let bvh = Bvh::build(&self.vertices, &self.triangles, &self.solids);
+        let faces = self.triangles.iter().map(|triangle| self.face(triangle)).collect();
         let environment = self.environment.filter(|radiance| !radiance.is_black()).map(|radiance| {
-            let (center, radius) = bounding_sphere(&bvh);
+            let (center, radius) = bvh.bounds().bounding_sphere();
+            // A margin for rounding; an empty scene has an environment too.
+            let radius = if radius > 0.0 { radius * (1.0 + 1e-6) } else { 1.0 };
             self.emitters.push(Emitter::Constant(Constant { radiance, center, radius }));
             EmitterId(self.emitters.len() as u32 - 1)
         });
@@ -180,6 +189,7 @@ impl Builder {
             vertices: self.vertices,
             normals: self.normals,
             triangles: self.triangles,
+            faces,
             triangle_shapes: self.triangle_shapes,
             solids: self.solids,
             solid_shapes: self.solid_shapes,
@@ -191,11 +201,4 @@ impl Builder {
             bvh,
         })
     }
-}
-
-/// A sphere around the geometry; a unit sphere where there is none.
-fn bounding_sphere(bvh: &Bvh) -> (DVec3, f64) {
-    let (min, max) = bvh.bounds();
-    let radius = 0.5 * (max - min).length() * (1.0 + 1e-6);
-    if radius.is_finite() && radius > 0.0 { (0.5 * (min + max), radius) } else { (DVec3::ZERO, 1.0) }
 }

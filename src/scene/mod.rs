@@ -1,15 +1,17 @@
 //! The scene as flat arrays, and the questions that integrators ask of it.
 
 mod builder;
+mod caster;
 mod surface;
 
 pub use builder::{Builder, FilmSpec, Mesh, SceneError, Shine};
+pub use caster::Caster;
 pub use surface::Surface;
 
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::emitter::{Emitter, Start};
-use crate::geometry::{Bvh, Primitive, Ray, Solid};
+use crate::geometry::{Bvh, Primitive, Ray, Solid, SurfacePoint};
 use crate::math::{AreaPdf, Discrete, Frame, Row};
 use glam::{DVec3, Vec3};
 
@@ -28,6 +30,15 @@ struct Shape {
     emitter: Option<EmitterId>,
 }
 
+/// What every point of a triangle shares.
+#[derive(Clone, Copy, Debug)]
+struct Face {
+    /// Unit normal, counter-clockwise.
+    normal: DVec3,
+    /// Distance by which rays are started off the triangle.
+    offset: f64,
+}
+
 /// A scene, ready to render.
 pub struct Scene {
     /// The camera.
@@ -42,6 +53,7 @@ pub struct Scene {
     /// Normals per vertex; zero where a mesh has none.
     normals: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
+    faces: Vec<Face>,
     triangle_shapes: Vec<u32>,
     solids: Vec<Solid>,
     solid_shapes: Vec<u32>,
@@ -55,74 +67,43 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// The closest surface along `ray`.
     #[inline]
-    pub fn intersect(&self, ray: &Ray) -> Option<Surface> {
+    fn intersect(&self, ray: &Ray) -> Option<Surface> {
         let hit = self.bvh.intersect(ray)?;
         Some(match hit.primitive {
             Primitive::Triangle { index, u, v } => self.triangle_surface(index as usize, u, v),
-            Primitive::Solid { index } => self.solid_surface(index as usize, ray, hit.t),
+            Primitive::Solid { index } => self.solid_surface(index as usize, ray.at(hit.t)),
         })
     }
 
-    /// Whether nothing lies between the surface `from` and the point `to` (moved off its own surface by the caller).
     #[inline]
-    pub fn visible(&self, from: DVec3, to: DVec3) -> bool {
-        let offset = to - from;
-        let distance = offset.length();
-        !self.bvh.occluded(&Ray { origin: from, direction: offset / distance, tmax: distance })
-    }
-
-    /// Whether the ray from `origin` along `direction` leaves the scene.
-    #[inline]
-    pub fn escapes(&self, origin: DVec3, direction: DVec3) -> bool {
-        !self.bvh.occluded(&Ray { origin, direction, tmax: f64::INFINITY })
-    }
-
     fn triangle_surface(&self, index: usize, u: f64, v: f64) -> Surface {
         let corners = self.triangles[index];
         let [a, b, c] = corners.map(|i| self.vertices[i as usize].as_dvec3());
-        let position = a * (1.0 - u - v) + b * u + c * v;
-        let face = (b - a).cross(c - a).normalize();
+        let w = 1.0 - u - v;
+        let Face { normal, offset } = self.faces[index];
         let [na, nb, nc] = corners.map(|i| self.normals[i as usize].as_dvec3());
-        let interpolated = na * (1.0 - u - v) + nb * u + nc * v;
-        let length = interpolated.length();
-        let (geometric, shading) = if length > 0.0 {
-            let shading = interpolated / length;
-            (if face.dot(shading) < 0.0 { -face } else { face }, shading)
+        let interpolated = na * w + nb * u + nc * v;
+        let length_squared = interpolated.length_squared();
+        let (geometric, shading) = if length_squared > 0.0 {
+            let shading = interpolated / length_squared.sqrt();
+            (if normal.dot(shading) < 0.0 { -normal } else { normal }, shading)
         } else {
-            (face, face)
+            (normal, normal)
         };
-        let magnitude = a.abs().max(b.abs()).max(c.abs()).max_element();
-        self.surface(position, geometric, shading, magnitude, self.triangle_shapes[index])
-    }
-
-    fn solid_surface(&self, index: usize, ray: &Ray, t: f64) -> Surface {
-        let (position, normal, magnitude) = match &self.solids[index] {
-            Solid::Sphere { center, radius } => {
-                let normal = (ray.origin + ray.direction * t - *center).normalize();
-                (*center + normal * *radius, normal, center.abs().max_element() + radius)
-            }
-            Solid::Disk { center, normal, radius } => {
-                let point = ray.origin + ray.direction * t;
-                let position = point - *normal * (point - *center).dot(*normal);
-                (position, *normal, center.abs().max_element() + radius)
-            }
-        };
-        self.surface(position, normal, normal, magnitude, self.solid_shapes[index])
+        self.surface(a * w + b * u + c * v, geometric, shading, offset, self.triangle_shapes[index])
     }
 
     #[inline]
-    fn surface(&self, position: DVec3, geometric: DVec3, shading: DVec3, magnitude: f64, shape: u32) -> Surface {
-        let shape = self.shapes[shape as usize];
-        Surface {
-            position,
-            geometric,
-            frame: Frame::around(shading),
-            bsdf: shape.bsdf,
-            emitter: shape.emitter,
-            offset: magnitude * surface::RELATIVE_OFFSET,
-        }
+    fn solid_surface(&self, index: usize, near: DVec3) -> Surface {
+        let SurfacePoint { position, normal, offset, .. } = self.solids[index].surface_point(near);
+        self.surface(position, normal, normal, offset, self.solid_shapes[index])
+    }
+
+    #[inline]
+    fn surface(&self, position: DVec3, geometric: DVec3, shading: DVec3, offset: f64, shape: u32) -> Surface {
+        let Shape { bsdf, emitter } = self.shapes[shape as usize];
+        Surface { position, geometric, frame: Frame::around(shading), bsdf, emitter, offset }
     }
 
     /// The scattering model `id`.

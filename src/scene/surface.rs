@@ -4,11 +4,6 @@ use super::{BsdfId, EmitterId};
 use crate::math::Frame;
 use glam::DVec3;
 
-/// Distance by which rays are started off a surface, relative to the largest coordinate that its position was computed
-/// from. Positions carry an error of some 1e-15 of that, so this is a wide margin, and still small against anything
-/// that a scene shows.
-pub(super) const RELATIVE_OFFSET: f64 = 1e-12;
-
 /// A point on a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface {

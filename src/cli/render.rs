@@ -1,0 +1,91 @@
+//! `pathblend render`.
+
+use super::progress::Reporter;
+use super::{SceneArguments, check_output, on_threads, parse_time};
+use crate::image::{Precision, WriteOptions, write_png};
+use crate::integrators::{Budget, Method, Settings, render};
+use clap::Args;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Time budget where none is given.
+const DEFAULT_TIME: Duration = Duration::from_secs(30);
+
+#[derive(Debug, Args)]
+pub(super) struct Render {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// Method.
+    #[arg(short, long, value_enum, default_value_t = Method::Bdpt)]
+    integrator: Method,
+    /// Render for this long (such as 30s, 5m, 2h), to the nearest pass. Default: 30s.
+    #[arg(long, value_name = "TIME", value_parser = parse_time, conflicts_with = "passes")]
+    time: Option<Duration>,
+    /// Render this many passes: the same image on any machine with any number of threads.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    passes: Option<u64>,
+    /// Seed of the random numbers.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Threads; default: all cores.
+    #[arg(long, value_name = "N", value_parser = parse_threads)]
+    threads: Option<usize>,
+    /// Image to write: OpenEXR with one layer per path class.
+    #[arg(short, long, value_name = "OUT.exr")]
+    output: PathBuf,
+    /// Also write a picture in sRGB.
+    #[arg(long, value_name = "OUT.png")]
+    png: Option<PathBuf>,
+    /// Leave out the path class layers.
+    #[arg(long)]
+    no_features: bool,
+    /// Store half instead of full floats.
+    #[arg(long)]
+    half: bool,
+    /// Write colour and layers to two files.
+    #[arg(long)]
+    split: bool,
+    /// Print what was done as one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A number of threads that a machine can have.
+pub(super) fn parse_threads(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|n| (1..=1024).contains(n)).ok_or_else(|| "expected a number from 1 to 1024".to_owned())
+}
+
+impl Render {
+    pub(super) fn run(self) -> anyhow::Result<()> {
+        check_output(&self.output)?;
+        let scene = self.scene.load()?;
+        let budget = match (self.passes, self.time) {
+            (Some(passes), _) => Budget::Passes(passes),
+            (None, time) => Budget::Wall(time.unwrap_or(DEFAULT_TIME)),
+        };
+        let settings = Settings { seed: self.seed, max_depth: scene.max_depth, features: !self.no_features, budget };
+        let mut reporter = Reporter::new(self.integrator.name());
+        let outcome = on_threads(self.threads, || render(&scene, self.integrator, &settings, |p| reporter.update(p)))?;
+        reporter.finish();
+        let precision = if self.half { Precision::Half } else { Precision::Float };
+        outcome.image.write(&self.output, &WriteOptions { precision, split: self.split })?;
+        if let Some(png) = &self.png {
+            write_png(png, outcome.image.colour.view(), 0.0)?;
+        }
+        if self.json {
+            println!("{}", serde_json::to_string(&outcome.summary())?);
+        } else {
+            let (wall, cpu) = (outcome.wall.as_secs_f64(), outcome.cpu.as_secs_f64());
+            let counts = &outcome.counts;
+            println!(
+                "{}: {} passes in {wall:.2} s ({cpu:.2} s of processor time): {:.3} M samples/s, {:.2} M rays/s; {}",
+                self.integrator.name(),
+                outcome.passes,
+                counts.samples as f64 / wall / 1e6,
+                counts.rays as f64 / wall / 1e6,
+                outcome.health
+            );
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,102 @@
+//! From the caller's slices to the hierarchy: drop what cannot be hit, let obvhs build, collapse.
+
+use glam::{DVec3, Vec3, Vec3A};
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
+use obvhs::ploc::PlocBuilder;
+
+use super::collapse::{Primitives, collapse};
+use super::frame::Frame;
+use super::groups::Groups;
+use super::{Bvh, Dropped};
+use crate::geometry::offset::cross;
+use crate::geometry::{Bounds, Solid};
+
+/// Beyond this a coordinate is taken for an error: one such vertex would cost all others their resolution.
+const LARGEST: f64 = 1e15;
+
+/// See [`Bvh::build`].
+pub fn build(vertices: &[Vec3], triangles: &[[u32; 3]], solids: &[Solid]) -> Bvh {
+    let mut dropped = Dropped::default();
+    let kept: Vec<(u32, [Vec3; 3])> = (0u32..)
+        .zip(triangles)
+        .filter_map(|(id, indices)| Some((id, checked_triangle(vertices, *indices, &mut dropped)?)))
+        .collect();
+    let kept_solids: Vec<u32> = (0u32..)
+        .zip(solids)
+        .filter(|(_, solid)| {
+            let valid = solid.is_valid() && solid.bounds().max_abs() <= LARGEST;
+            dropped.invalid += usize::from(!valid);
+            valid
+        })
+        .map(|(id, _)| id)
+        .collect();
+
+    let corners = kept.iter().flat_map(|(_, corners)| corners);
+    let meshes = corners.fold(Bounds::EMPTY, |bounds, corner| bounds.including(corner.as_dvec3()));
+    let bounds = kept_solids.iter().fold(meshes, |bounds, id| bounds.union(solids[*id as usize].bounds()));
+    let frame = Frame::new(meshes, bounds);
+
+    // Exact, by the choice of the frame.
+    let to_local = |corner: Vec3| frame.to_local(corner.as_dvec3()).as_vec3();
+    let local: Vec<(u32, [Vec3; 3])> = kept.into_iter().map(|(id, corners)| (id, corners.map(to_local))).collect();
+    let mut boxes: Vec<Aabb> = local.iter().map(|(_, corners)| triangle_box(corners)).collect();
+    boxes.extend(kept_solids.iter().map(|id| solid_box(&solids[*id as usize], &frame)));
+
+    let groups = Groups::of_equal(&boxes);
+    let tree = binary(&groups.firsts().map(|first| boxes[first as usize]).collect::<Vec<_>>());
+    let wide = collapse(&tree, &Primitives { boxes: &boxes, groups: &groups, triangles: &local, solids: &kept_solids });
+    Bvh {
+        frame,
+        bounds,
+        dropped,
+        nodes: wide.nodes,
+        packets: wide.packets,
+        solids: solids.to_vec(),
+        stack: 7 * wide.depth + 1,
+    }
+}
+
+/// The corners, unless they are to be dropped, which is counted.
+fn checked_triangle(vertices: &[Vec3], indices: [u32; 3], dropped: &mut Dropped) -> Option<[Vec3; 3]> {
+    // Written so that NaN fails.
+    let sound = |v: &&Vec3| v.abs().cmple(Vec3::splat(LARGEST as f32)).all();
+    let corner = |i: usize| vertices.get(indices[i] as usize).filter(sound).copied();
+    let (Some(a), Some(b), Some(c)) = (corner(0), corner(1), corner(2)) else {
+        dropped.invalid += 1;
+        return None;
+    };
+    let [a64, b64, c64] = [a, b, c].map(Vec3::as_dvec3);
+    if DVec3::from(cross((b64 - a64).to_array(), (c64 - a64).to_array())) == DVec3::ZERO {
+        dropped.degenerate += 1;
+        return None;
+    }
+    Some([a, b, c])
+}
+
+fn triangle_box([a, b, c]: &[Vec3; 3]) -> Aabb {
+    Aabb::new(Vec3A::from(a.min(*b).min(*c)), Vec3A::from(a.max(*b).max(*c)))
+}
+
+/// Rounded outward by at least one step of `f32`, which also covers the rounding of the bounds in `f64`.
+fn solid_box(solid: &Solid, frame: &Frame) -> Aabb {
+    let bounds = solid.bounds();
+    let outward = |point: DVec3, step: fn(f32) -> f32| Vec3A::from(frame.to_local(point).as_vec3().map(step));
+    Aabb::new(outward(bounds.min, f32::next_down), outward(bounds.max, f32::next_up))
+}
+
+/// obvhs's medium preset, without its merging of leaves: the collapse chooses leaves for packets of eight itself.
+fn binary(boxes: &[Aabb]) -> Bvh2 {
+    let preset = BvhBuildParams::medium_build();
+    let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
+        preset.ploc_search_distance,
+        boxes,
+        (0u32..).take(boxes.len()).collect(),
+        preset.sort_precision,
+        preset.search_depth_threshold,
+    );
+    ReinsertionOptimizer::default().run(&mut tree, preset.reinsertion_batch_ratio, None);
+    tree
+}

@@ -1,0 +1,80 @@
+//! A bounding volume hierarchy, eight children wide, over packets of up to eight triangles and analytic solids.
+//!
+//! The walk: [`build`] drops what cannot be hit, puts equal boxes together ([`groups`]) and lets obvhs build a binary hierarchy, [`collapse`] turns it into wide
+//! nodes ([`wide`]) and packets ([`packet`]), [`traverse`] carries a ray's constants ([`query`]) through them.
+//!
+//! All of it works in the hierarchy's own [`frame`]: relative to a centre, scaled by a power of two, both chosen so that
+//! no vertex is rounded.
+
+mod build;
+mod collapse;
+mod frame;
+mod groups;
+mod packet;
+mod query;
+mod traverse;
+mod wide;
+
+use glam::Vec3;
+
+use super::{Bounds, Hit, Ray, Solid};
+use frame::Frame;
+use packet::Packet;
+use wide::Node;
+
+/// Triangles and solids that a hierarchy left out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Dropped {
+    /// Coordinates that are not finite or beyond 1e15, indices beyond the vertices, a radius that is not positive, a
+    /// normal that is not a unit vector.
+    pub invalid: usize,
+    /// Triangles without area, which no ray can hit.
+    pub degenerate: usize,
+}
+
+/// The hierarchy; holds its own copy of the geometry. Immutable and shared between threads.
+#[derive(Clone, Debug)]
+pub struct Bvh {
+    frame: Frame,
+    bounds: Bounds,
+    dropped: Dropped,
+    nodes: Vec<Node>,
+    packets: Vec<Packet>,
+    solids: Vec<Solid>,
+    /// The most entries that a traversal can have on its stack.
+    stack: usize,
+}
+
+impl Bvh {
+    /// Builds the hierarchy. `vertices` are in scene units and taken as exact; a triangle names three of them. What
+    /// cannot be hit is left out and counted ([`Bvh::dropped`]); indices in hits refer to the slices given here.
+    #[must_use]
+    pub fn build(vertices: &[Vec3], triangles: &[[u32; 3]], solids: &[Solid]) -> Self {
+        build::build(vertices, triangles, solids)
+    }
+
+    /// The closest hit with `0 < t < tmax`.
+    #[must_use]
+    pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        let best = self.dispatch::<false>(ray)?;
+        best.primitive.map(|primitive| Hit { t: best.t * self.frame.inverse, primitive })
+    }
+
+    /// Whether anything lies at `0 < t < tmax`: the same answer as `intersect(ray).is_some()`, sooner.
+    #[must_use]
+    pub fn occluded(&self, ray: &Ray) -> bool {
+        self.dispatch::<true>(ray).is_some_and(|best| best.primitive.is_some())
+    }
+
+    /// The box around all that was not dropped; empty for an empty scene.
+    #[must_use]
+    pub const fn bounds(&self) -> Bounds {
+        self.bounds
+    }
+
+    /// What was left out of the hierarchy.
+    #[must_use]
+    pub const fn dropped(&self) -> Dropped {
+        self.dropped
+    }
+}

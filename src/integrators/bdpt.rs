@@ -1,0 +1,90 @@
+//! Bidirectional path tracing with all techniques (Veach 1997, chapter 10). A pass takes one walk from the camera and
+//! one from a light per pixel; techniques with one light vertex sample a fresh one.
+
+use super::path::film_position;
+use super::{Counts, render::Settings};
+use crate::film::{Band, Film, Kernel, Splats};
+use crate::math::Stream;
+use crate::paths::{Heuristic, Random, Subpath, connect, light_vertex, trace_camera, trace_light};
+use crate::scene::{Caster, Scene};
+
+/// Vertices of a subpath before Russian roulette sets in.
+const ROULETTE_FROM: usize = 5;
+
+/// The method's settings.
+pub(super) struct Bdpt {
+    seed: u64,
+    max_depth: usize,
+}
+
+/// What one job needs, reused from path to path.
+struct Job<'a> {
+    scene: Caster<'a>,
+    kernel: &'a Kernel,
+    size: [usize; 2],
+    stream: Stream,
+    camera: Subpath,
+    light: Subpath,
+    splats: Splats,
+}
+
+impl Bdpt {
+    pub(super) fn start(settings: &Settings) -> Self {
+        Self { seed: settings.seed, max_depth: settings.max_depth }
+    }
+
+    pub(super) fn pass(&self, scene: &Scene, film: &mut Film, pass: u64, counts: &mut Counts) {
+        let kernel = film.kernel.clone();
+        let size = film.size;
+        let jobs = film.for_each_band(|index, band| {
+            let mut job = Job {
+                scene: Caster::new(scene),
+                kernel: &kernel,
+                size,
+                stream: Stream::new(self.seed, &[pass, index as u64]),
+                camera: Subpath::default(),
+                light: Subpath::default(),
+                splats: Splats::new(size),
+            };
+            for pixel in band.pixels() {
+                job.sample(pixel, self.max_depth, band);
+            }
+            (job.splats, job.scene.rays())
+        });
+        counts.add((size[0] * size[1]) as u64, jobs.iter().map(|job| job.1).sum());
+        let splats: Vec<Splats> = jobs.into_iter().map(|job| job.0).collect();
+        film.splat(&splats, 1.0);
+    }
+}
+
+impl Job<'_> {
+    fn sample(&mut self, pixel: [usize; 2], max_depth: usize, band: &mut Band) {
+        let first = self.stream.row();
+        let film = film_position(self.kernel, self.size, pixel, first);
+        let rows = &mut Random(&mut self.stream);
+        trace_camera(&self.scene, film, first, rows, max_depth + 1, ROULETTE_FROM, &mut self.camera);
+        // s = 0 takes all edges from the camera; t = 1 leaves one edge to the connection.
+        trace_light(&self.scene, rows, max_depth, ROULETTE_FROM, &mut self.light);
+        let (camera, light) = (&self.camera.vertices, &self.light.vertices);
+        for t in 1..=camera.len() {
+            for s in 0..=light.len().min(max_depth + 1 - t) {
+                if s + t < 2 {
+                    continue;
+                }
+                let fresh;
+                let start = if s == 1 {
+                    let Some(vertex) = light_vertex(&self.scene, self.stream.row()) else { continue };
+                    fresh = [vertex];
+                    &fresh[..]
+                } else {
+                    &light[..s]
+                };
+                let Some(found) = connect(&self.scene, start, &camera[..t], Heuristic::Power) else { continue };
+                match found.film {
+                    Some(film) => self.splats.add(self.kernel, film, found.class, found.value),
+                    None => band.add(pixel, found.class, found.value),
+                }
+            }
+        }
+    }
+}

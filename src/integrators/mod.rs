@@ -1,0 +1,101 @@
+//! The methods. Each adds one estimate of the whole image to the film per pass, so that the mean over passes is the
+//! image, whatever the method; what a pass is made of is the method's own business.
+//!
+//! A new method: its file with `start` and `pass`, and one arm in each match below.
+
+mod bdpt;
+mod mmlt;
+mod path;
+mod render;
+mod sppm;
+
+pub use render::{Budget, Outcome, Progress, Settings, render};
+
+use crate::film::Film;
+use crate::scene::Scene;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// The methods by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Path tracing from the camera with next event estimation.
+    Path,
+    /// Bidirectional path tracing, all techniques.
+    Bdpt,
+    /// Stochastic progressive photon mapping.
+    Sppm,
+    /// Multiplexed Metropolis light transport.
+    Mmlt,
+}
+
+impl Method {
+    /// The name, as the command line and the files have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Path => "path",
+            Self::Bdpt => "bdpt",
+            Self::Sppm => "sppm",
+            Self::Mmlt => "mmlt",
+        }
+    }
+}
+
+/// How often a kind of mutation was proposed and accepted, for one path length.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Acceptance {
+    /// Path length in edges.
+    pub length: usize,
+    /// Proposals.
+    pub proposed: u64,
+    /// Accepted proposals.
+    pub accepted: u64,
+}
+
+/// What a render did.
+#[derive(Clone, Debug, Default)]
+pub struct Counts {
+    /// Paths from the camera, light paths or mutations.
+    pub samples: u64,
+    /// Rays cast.
+    pub rays: u64,
+    /// Acceptance by mutation, then by length.
+    pub acceptance: BTreeMap<&'static str, Vec<Acceptance>>,
+}
+
+impl Counts {
+    fn add(&mut self, samples: u64, rays: u64) {
+        self.samples += samples;
+        self.rays += rays;
+    }
+}
+
+/// A running method.
+enum Integrator {
+    Path(path::Path),
+    Bdpt(bdpt::Bdpt),
+    Sppm(sppm::Sppm),
+    Mmlt(Box<mmlt::Mmlt>),
+}
+
+impl Integrator {
+    fn start(method: Method, scene: &Scene, settings: &Settings) -> Self {
+        match method {
+            Method::Path => Self::Path(path::Path::start(settings)),
+            Method::Bdpt => Self::Bdpt(bdpt::Bdpt::start(settings)),
+            Method::Sppm => Self::Sppm(sppm::Sppm::start(scene, settings)),
+            Method::Mmlt => Self::Mmlt(Box::new(mmlt::Mmlt::start(scene, settings))),
+        }
+    }
+
+    /// Adds the estimate of pass number `pass` to `film`.
+    fn pass(&mut self, scene: &Scene, film: &mut Film, pass: u64, counts: &mut Counts) {
+        match self {
+            Self::Path(path) => path.pass(scene, film, pass, counts),
+            Self::Bdpt(bdpt) => bdpt.pass(scene, film, pass, counts),
+            Self::Sppm(sppm) => sppm.pass(scene, film, pass, counts),
+            Self::Mmlt(mmlt) => mmlt.pass(scene, film, pass, counts),
+        }
+    }
+}

@@ -1,0 +1,303 @@
+//! Stochastic progressive photon mapping (Hachisuka and Jensen 2009) in the form of Knaus and Zwicker (2011): the
+//! radius shrinks by a rule that does not depend on what was found, so that every pass is an independent estimate and
+//! the image is the mean over passes.
+//!
+//! A pass walks from the camera to the first diffuse-like vertex of each pixel. Light met on the way and direct light
+//! are estimated as in path tracing. All other light is gathered from photons that met at least one surface before:
+//! with N photons of power Φ and radius r, L = 1 / (N π r²) Σ f Φ. The class of a photon's path is the photon's word,
+//! the letter of the gathering vertex for the two directions, and the word of the camera's walk.
+
+use super::path::{self, State, film_position};
+use super::{Counts, render::Settings};
+use crate::film::{Band, Film, Kernel, Word};
+use crate::math::{Stream, Walk};
+use crate::paths::{Random, Subpath, VertexKind, trace_light};
+use crate::scene::{Caster, Scene, Surface};
+use crate::spectrum::Spectrum;
+use glam::{DVec3, IVec3};
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// Share of the photons in a radius that is kept from pass to pass (Knaus and Zwicker 2011, eq. 20); the field's usual
+/// value.
+const ALPHA: f64 = 2.0 / 3.0;
+
+/// First radius in units of the size that a pixel has at the distance of the gathering vertex.
+const FIRST_RADIUS: f64 = 2.5;
+
+/// Photons whose distance from the tangent plane exceeds this share of the radius lie on another surface.
+const FLATNESS: f64 = 0.3;
+
+/// Jobs that the photons of a pass are split into, independent of the number of threads.
+const JOBS: usize = 32;
+
+/// Vertices of a photon's path before Russian roulette sets in.
+const ROULETTE_FROM: usize = 3;
+
+/// The method's settings and the radius of the next pass.
+pub(super) struct Sppm {
+    seed: u64,
+    max_depth: usize,
+    photons: usize,
+    pixel_angle: f64,
+    /// Square of the radius relative to the first one.
+    shrinkage: f64,
+}
+
+/// Where a pixel gathers.
+struct Gather {
+    surface: Surface,
+    back: DVec3,
+    throughput: Spectrum,
+    word: Word,
+    /// Edges from the camera.
+    edges: usize,
+    radius: f64,
+    pixel: [usize; 2],
+}
+
+/// A photon that met a surface.
+#[derive(Clone, Copy)]
+struct Photon {
+    position: DVec3,
+    /// Unit direction back to where it came from.
+    back: DVec3,
+    power: Spectrum,
+    word: Word,
+    /// Edges from the light.
+    edges: usize,
+}
+
+impl Sppm {
+    pub(super) fn start(scene: &Scene, settings: &Settings) -> Self {
+        Self {
+            seed: settings.seed,
+            max_depth: settings.max_depth,
+            photons: scene.camera.size.iter().product(),
+            pixel_angle: scene.camera.pixel_angle(),
+            shrinkage: 1.0,
+        }
+    }
+
+    pub(super) fn pass(&mut self, scene: &Scene, film: &mut Film, pass: u64, counts: &mut Counts) {
+        let kernel = film.kernel.clone();
+        let size = film.size;
+        let radius = FIRST_RADIUS * self.pixel_angle * self.shrinkage.sqrt();
+        let walks = film.for_each_band(|index, band| {
+            let caster = Caster::new(scene);
+            let mut stream = Stream::new(self.seed, &[0, pass, index as u64]);
+            let mut gathers = Vec::new();
+            for pixel in band.pixels() {
+                gathers.extend(self.walk(&caster, &kernel, size, pixel, radius, &mut stream, band));
+            }
+            (gathers, caster.rays())
+        });
+        let shot: Vec<(Vec<Photon>, u64)> =
+            (0..JOBS).into_par_iter().map(|job| self.shoot(scene, pass, job as u64)).collect();
+        let rays = walks.iter().map(|w| w.1).sum::<u64>() + shot.iter().map(|s| s.1).sum::<u64>();
+        let mean_radius = mean(walks.iter().flat_map(|w| &w.0).map(|gather| gather.radius));
+        let grid = Grid::new(shot.into_iter().flat_map(|s| s.0).collect(), 2.0 * mean_radius);
+        film.for_each_band(|index, band| {
+            for gather in &walks[index].0 {
+                self.gather(scene, &grid, gather, band);
+            }
+        });
+        counts.add((self.photons + size[0] * size[1]) as u64, rays);
+        let n = (pass + 1) as f64;
+        self.shrinkage *= (n + ALPHA) / (n + 1.0);
+    }
+
+    /// Walks from the camera to the first diffuse-like vertex, adding light met on the way and direct light.
+    #[allow(clippy::too_many_arguments)]
+    fn walk(
+        &self,
+        scene: &Caster<'_>,
+        kernel: &Kernel,
+        size: [usize; 2],
+        pixel: [usize; 2],
+        radius_per_distance: f64,
+        stream: &mut Stream,
+        band: &mut Band,
+    ) -> Option<Gather> {
+        let row = stream.row();
+        let mut state = State::at_camera(scene, film_position(kernel, size, pixel, row), row);
+        let mut distance = 0.0;
+        for edges in 1..=self.max_depth {
+            let Some(surface) = scene.intersect(state.origin, state.direction) else {
+                path::background(scene, &state, pixel, band);
+                return None;
+            };
+            distance += surface.position.distance(state.origin);
+            path::emission(scene, &surface, &state, pixel, band);
+            if edges == self.max_depth {
+                return None;
+            }
+            let wi = surface.frame.to_local(-state.direction);
+            let bsdf = scene.bsdf(surface.bsdf);
+            if bsdf.gathers(wi) {
+                path::direct(scene, &surface, wi, &state, false, stream, pixel, band);
+                return Some(Gather {
+                    surface,
+                    back: -state.direction,
+                    throughput: state.throughput,
+                    word: state.word,
+                    edges,
+                    radius: radius_per_distance * distance,
+                    pixel,
+                });
+            }
+            if !bsdf.is_delta(wi) {
+                path::direct(scene, &surface, wi, &state, true, stream, pixel, band);
+            }
+            let scatter = bsdf.sample(wi, stream.row(), Walk::FromCamera)?;
+            state = state.scattered(&surface, &scatter, scatter.weight);
+        }
+        None
+    }
+
+    /// The photons of one job, with the number of rays that it cast.
+    fn shoot(&self, scene: &Scene, pass: u64, job: u64) -> (Vec<Photon>, u64) {
+        let caster = Caster::new(scene);
+        let mut stream = Stream::new(self.seed, &[1, pass, job]);
+        let mut path = Subpath::default();
+        let mut photons = Vec::new();
+        let (first, last) = (self.photons * job as usize / JOBS, self.photons * (job as usize + 1) / JOBS);
+        for _ in first..last {
+            trace_light(&caster, &mut Random(&mut stream), self.max_depth, ROULETTE_FROM, &mut path);
+            // The first surface receives direct light, which the walks from the camera account for.
+            for (edges, vertex) in path.vertices.iter().enumerate().skip(2) {
+                let VertexKind::Surface(surface) = &vertex.kind else { continue };
+                if scene.bsdf(surface.bsdf).gathers(surface.frame.to_local(vertex.back)) {
+                    photons.push(Photon {
+                        position: vertex.position,
+                        back: vertex.back,
+                        power: vertex.throughput / self.photons as f64,
+                        word: vertex.word,
+                        edges,
+                    });
+                }
+            }
+        }
+        (photons, caster.rays())
+    }
+
+    fn gather(&self, scene: &Scene, grid: &Grid, gather: &Gather, band: &mut Band) {
+        let Gather { surface, radius, .. } = gather;
+        let wi = surface.frame.to_local(gather.back);
+        let bsdf = scene.bsdf(surface.bsdf);
+        let scale = gather.throughput / (PI * radius * radius);
+        grid.within(surface.position, *radius, |photon| {
+            let height = (photon.position - surface.position).dot(surface.geometric).abs();
+            if height > FLATNESS * radius || photon.edges + gather.edges > self.max_depth {
+                return;
+            }
+            let wo = surface.frame.to_local(photon.back);
+            let Some(scattered) = bsdf.evaluate(wi, wo, Walk::FromCamera) else { return };
+            // Photons arrive per true area, scattering counts area seen along the shading normal.
+            let geometric = photon.back.dot(surface.geometric).abs();
+            let correction = if geometric > 0.0 { wo.z.abs() / geometric } else { 0.0 };
+            let class = photon.word.then(scattered.letter).join(gather.word);
+            band.add(gather.pixel, class, scale * scattered.value * photon.power * correction);
+        });
+    }
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, n) = values.fold((0.0, 0u64), |(sum, n), value| (sum + value, n + 1));
+    if n == 0 { 1.0 } else { sum / n as f64 }
+}
+
+/// Photons sorted into the cells of a hashed grid.
+struct Grid {
+    cell: f64,
+    /// Where the photons of each bucket start; one more entry than there are buckets.
+    starts: Vec<u32>,
+    photons: Vec<Photon>,
+}
+
+impl Grid {
+    fn new(unsorted: Vec<Photon>, cell: f64) -> Self {
+        let buckets = unsorted.len().next_power_of_two();
+        let mut grid = Self { cell, starts: vec![0; buckets + 1], photons: unsorted.clone() };
+        let bucket_of: Vec<usize> = unsorted.iter().map(|photon| grid.bucket(grid.cell_of(photon.position))).collect();
+        for bucket in &bucket_of {
+            grid.starts[bucket + 1] += 1;
+        }
+        for bucket in 0..buckets {
+            grid.starts[bucket + 1] += grid.starts[bucket];
+        }
+        let mut next = grid.starts.clone();
+        for (photon, bucket) in unsorted.iter().zip(bucket_of) {
+            grid.photons[next[bucket] as usize] = *photon;
+            next[bucket] += 1;
+        }
+        grid
+    }
+
+    #[inline]
+    fn cell_of(&self, position: DVec3) -> IVec3 {
+        (position / self.cell).floor().as_ivec3()
+    }
+
+    #[inline]
+    fn bucket(&self, cell: IVec3) -> usize {
+        // Teschner et al. 2003, *Optimized Spatial Hashing*.
+        let hash = (cell.x as u32).wrapping_mul(73_856_093)
+            ^ (cell.y as u32).wrapping_mul(19_349_663)
+            ^ (cell.z as u32).wrapping_mul(83_492_791);
+        hash as usize & (self.starts.len() - 2)
+    }
+
+    /// Calls `each` for the photons closer to `center` than `radius`.
+    #[inline]
+    fn within(&self, center: DVec3, radius: f64, mut each: impl FnMut(&Photon)) {
+        let (low, high) = (self.cell_of(center - radius), self.cell_of(center + radius));
+        for x in low.x..=high.x {
+            for y in low.y..=high.y {
+                for z in low.z..=high.z {
+                    let cell = IVec3::new(x, y, z);
+                    let bucket = self.bucket(cell);
+                    let range = self.starts[bucket] as usize..self.starts[bucket + 1] as usize;
+                    for photon in &self.photons[range] {
+                        let near = photon.position.distance_squared(center) < radius * radius;
+                        if near && self.cell_of(photon.position) == cell {
+                            each(photon);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::warp::sphere;
+
+    #[test]
+    fn the_grid_finds_what_a_search_of_all_photons_finds() {
+        let mut stream = Stream::new(1, &[]);
+        let mut point =
+            |scale: f64| DVec3::new(stream.number(), stream.number(), stream.number()) * scale - 0.5 * scale;
+        let photons: Vec<Photon> = (0..5000)
+            .map(|_| Photon {
+                position: point(3.0),
+                back: sphere::sample([0.2, 0.3]),
+                power: Spectrum::ONE,
+                word: Word::EMPTY,
+                edges: 2,
+            })
+            .collect();
+        let grid = Grid::new(photons.clone(), 0.2);
+        for radius in [0.01, 0.1, 0.5, 1.0] {
+            for _ in 0..50 {
+                let center = point(3.5);
+                let mut found = 0;
+                grid.within(center, radius, |_| found += 1);
+                let expected = photons.iter().filter(|p| p.position.distance(center) < radius).count();
+                assert_eq!(found, expected);
+            }
+        }
+    }
+}

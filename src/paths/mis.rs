@@ -1,0 +1,86 @@
+//! Weights of the techniques by the ratios of their densities, outward from the connection (Veach 1997, section 10.2).
+//!
+//! With p_s the density of technique s for one and the same path, p_{s+1} / p_s = L_s / C_s and p_{s-1} / p_s =
+//! C_{s-1} / L_{s-1}, where L_i and C_i are the densities of vertex x_i in a walk from the light and from the camera.
+//! A vertex with delta lobes only cannot be an end of a connection, so techniques that would connect there have no
+//! density; the coefficients of its Dirac densities stand in for the densities and cancel.
+
+use super::subpath::{Vertex, VertexKind};
+use crate::emitter::Start;
+
+/// The densities that a connection changes: those of its two end vertices and their predecessors, in a walk from the
+/// other side.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Junction {
+    /// C of the last vertex of the light subpath.
+    pub light: f64,
+    /// C of the vertex before it.
+    pub light_previous: f64,
+    /// L of the last vertex of the camera subpath.
+    pub camera: f64,
+    /// L of the vertex before it.
+    pub camera_previous: f64,
+}
+
+/// Exponent of the power heuristic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Heuristic {
+    /// Weights proportional to the densities.
+    Balance,
+    /// Weights proportional to their squares.
+    Power,
+}
+
+impl Heuristic {
+    #[inline]
+    fn apply(self, ratio: f64) -> f64 {
+        match self {
+            Self::Balance => ratio,
+            Self::Power => ratio * ratio,
+        }
+    }
+}
+
+/// Weight of the technique that connects `light` (all its vertices) with `camera` (all its vertices).
+#[inline]
+pub(super) fn weight(light: &[Vertex], camera: &[Vertex], junction: &Junction, heuristic: Heuristic) -> f64 {
+    let mut sum = 1.0;
+
+    // Techniques with more vertices from the camera: x_{s-1}, x_{s-2}, … change sides.
+    let mut ratio = 1.0;
+    for i in (0..light.len()).rev() {
+        let from_camera = match light.len() - i {
+            1 => junction.light,
+            2 => junction.light_previous,
+            _ => light[i].reverse.0,
+        };
+        ratio *= from_camera / light[i].forward.0;
+        let possible = if i == 0 { can_be_hit(&light[0]) } else { !light[i].delta && !light[i - 1].delta };
+        if possible {
+            sum += heuristic.apply(ratio);
+        }
+    }
+
+    // Techniques with more vertices from the light; the lens cannot be hit, so its vertex stays.
+    let mut ratio = 1.0;
+    // The end of a walk that met a light is no scattering vertex there: what it is made of does not matter.
+    let scatters = |i: usize| !(light.is_empty() && i == camera.len() - 1);
+    for i in (1..camera.len()).rev() {
+        let from_light = match camera.len() - i {
+            1 => junction.camera,
+            2 => junction.camera_previous,
+            _ => camera[i].reverse.0,
+        };
+        ratio *= from_light / camera[i].forward.0;
+        if !(camera[i].delta && scatters(i)) && !camera[i - 1].delta {
+            sum += heuristic.apply(ratio);
+        }
+    }
+    1.0 / sum
+}
+
+/// Whether a walk from the camera can meet the light that `vertex` lies on.
+#[inline]
+fn can_be_hit(vertex: &Vertex) -> bool {
+    !matches!(vertex.kind, VertexKind::Light(_, Start::Point { .. }))
+}

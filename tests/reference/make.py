@@ -1,0 +1,97 @@
+#!/usr/bin/env python3
+"""Renders the reference images of the tests with Mitsuba 3, a renderer of other people's.
+
+    pip install mitsuba==3.9.1 numpy
+    python3 tests/reference/make.py [SCENE ...] [--quick]
+
+For each scene (all ten by default) it writes beside itself
+    SCENE.exr       mean of 16 independent batches, half float, 64x64, linear RGB
+    SCENE_var.exr   variance of that mean per pixel and channel, single float
+and prints a row of the README's table. --quick renders a 64th of the samples.
+"""
+import argparse
+import os
+import pathlib
+import tempfile
+import time
+
+HERE = pathlib.Path(__file__).resolve().parent
+SCENES = HERE.parent.parent / "scenes"
+SIDE = 64
+BATCHES = 16
+MAX_DEPTH = 9
+RR_DEPTH = 100  # beyond MAX_DEPTH: no Russian roulette
+# Samples per pixel over all batches: half a minute to three minutes for each scene on one core.
+SPP = {
+    "box": 8192,
+    "spheres": 16384,
+    "plates": 4096,
+    "door": 3072,
+    "torus": 8192,
+    "ring": 8192,
+    "lamp": 4096,
+    "gallery": 2048,
+    "pool": 4096,
+    "bokeh": 4096,
+}
+
+
+def render(mi, np, name, spp):
+    """Mean, variance of the mean, and seconds; batch k has seed k."""
+    scene = mi.load_file(str(SCENES / name / "scene.xml"), width=str(SIDE), height=str(SIDE))
+    integrator = mi.load_dict({"type": "path", "max_depth": MAX_DEPTH, "rr_depth": RR_DEPTH})
+    started = time.perf_counter()
+    batches = []
+    for seed in range(BATCHES):
+        image = mi.render(scene, integrator=integrator, spp=spp // BATCHES, seed=seed)
+        batches.append(np.array(image, dtype=np.float64)[..., :3])
+    batches = np.stack(batches)
+    return batches.mean(0), batches.var(0, ddof=1) / BATCHES, time.perf_counter() - started
+
+
+def write(mi, np, pixels, component, path):
+    """Whole or not at all: to a file beside it, then by rename."""
+    bitmap = mi.Bitmap(np.ascontiguousarray(pixels, dtype=np.float32))
+    bitmap = bitmap.convert(mi.Bitmap.PixelFormat.RGB, component, srgb_gamma=False)
+    with tempfile.TemporaryDirectory(dir=path.parent) as folder:
+        draft = pathlib.Path(folder) / path.name
+        bitmap.write(str(draft))
+        os.replace(draft, path)
+
+
+def main():
+    args = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    args.add_argument("scenes", nargs="*", metavar="SCENE", help=", ".join(SPP))
+    args.add_argument("--quick", action="store_true", help="a 64th of the samples, to try the script")
+    args.add_argument("--out", type=pathlib.Path, default=HERE, help="folder to write to")
+    args = args.parse_args()
+    unknown = set(args.scenes) - set(SPP)
+    if unknown:
+        raise SystemExit(f"unknown scenes: {', '.join(sorted(unknown))}; there are {', '.join(SPP)}")
+
+    import drjit
+    import mitsuba as mi
+    import numpy as np
+
+    mi.set_variant("scalar_rgb")
+    mi.set_log_level(mi.LogLevel.Warn)
+    args.out.mkdir(parents=True, exist_ok=True)
+    for name in args.scenes or SPP:
+        spp = SPP[name] // 64 if args.quick else SPP[name]
+        drjit.set_thread_count(1)
+        mean, variance, seconds = render(mi, np, name, spp)
+        # Mitsuba 3.9.1 writes EXR files on the thread pool and hangs where that has one thread.
+        drjit.set_thread_count(2)
+        write(mi, np, mean, mi.Struct.Type.Float16, args.out / f"{name}.exr")
+        write(mi, np, variance, mi.Struct.Type.Float32, args.out / f"{name}_var.exr")
+        deviation = np.sqrt(variance.mean(-1))
+        level = mean.mean(-1)
+        whole = np.sqrt(variance.sum((0, 1))).mean() / (SIDE * SIDE) / level.mean()
+        rms = np.sqrt(variance.mean()) / level.mean()
+        typical = np.median(deviation / np.maximum(level, 0.01))
+        print(f"| {name} | {spp} | {level.mean():.4f} | {100 * rms:.1f} % | {100 * typical:.1f} % "
+              f"| {100 * whole:.2f} % | {seconds:.0f} s |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
