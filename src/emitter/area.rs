@@ -15,13 +15,22 @@ pub struct Area {
     inverse_area: f64,
 }
 
+/// A triangle as light is sampled on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Facet {
+    corner: DVec3,
+    edges: [DVec3; 2],
+    normal: DVec3,
+    area: f64,
+}
+
 /// A surface that points are sampled on.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Surface {
-    /// Triangles, chosen by area; counter-clockwise as seen from the shining side.
+    /// Triangles, chosen by area.
     Triangles {
-        /// Corner positions.
-        corners: Vec<[DVec3; 3]>,
+        /// The triangles.
+        facets: Vec<Facet>,
         /// Choice by area.
         choice: Discrete,
     },
@@ -44,16 +53,18 @@ pub enum Surface {
 }
 
 impl Surface {
-    /// The surface of some triangles; `None` when their area is zero or not finite.
-    pub fn triangles(corners: Vec<[DVec3; 3]>) -> Option<Self> {
-        let areas: Vec<f64> = corners.iter().map(triangle_area).collect();
-        Some(Self::Triangles { choice: Discrete::new(&areas)?, corners })
+    /// The surface of triangles with the given corners, counter-clockwise as seen from the shining side; `None` when
+    /// their area is zero or not finite.
+    pub fn triangles(corners: impl Iterator<Item = [DVec3; 3]>) -> Option<Self> {
+        let facets: Vec<Facet> = corners.map(Facet::new).collect();
+        let areas: Vec<f64> = facets.iter().map(|facet| facet.area).collect();
+        Some(Self::Triangles { choice: Discrete::new(&areas)?, facets })
     }
 
     /// Area in m².
     pub fn area(&self) -> f64 {
         match self {
-            Self::Triangles { corners, .. } => corners.iter().map(triangle_area).sum(),
+            Self::Triangles { facets, .. } => facets.iter().map(|facet| facet.area).sum(),
             Self::Sphere { radius, .. } => 4.0 * PI * radius * radius,
             Self::Disk { radius, .. } => PI * radius * radius,
         }
@@ -63,11 +74,11 @@ impl Surface {
     #[inline]
     fn sample(&self, row: Row) -> (DVec3, DVec3) {
         match self {
-            Self::Triangles { corners, choice } => {
+            Self::Triangles { facets, choice } => {
                 let (index, u) = choice.sample(row[1]);
-                let [a, b, c] = corners[index];
+                let facet = &facets[index];
                 let at = warp::triangle::sample([u, row[2]]);
-                (a + (b - a) * at.x + (c - a) * at.y, (b - a).cross(c - a).normalize())
+                (facet.corner + facet.edges[0] * at.x + facet.edges[1] * at.y, facet.normal)
             }
             Self::Sphere { center, radius } => {
                 let normal = warp::sphere::sample([row[1], row[2]]);
@@ -82,8 +93,12 @@ impl Surface {
     }
 }
 
-fn triangle_area([a, b, c]: &[DVec3; 3]) -> f64 {
-    0.5 * (b - a).cross(c - a).length()
+impl Facet {
+    fn new([a, b, c]: [DVec3; 3]) -> Self {
+        let edges = [b - a, c - a];
+        let cross = edges[0].cross(edges[1]);
+        Self { corner: a, edges, normal: cross.normalize_or_zero(), area: 0.5 * cross.length() }
+    }
 }
 
 impl Area {

@@ -37,6 +37,9 @@ impl Discrete {
     /// Index chosen by `u` in [0, 1), with what is left of `u` after the choice, again uniform in [0, 1).
     #[inline]
     pub fn sample(&self, u: f64) -> (usize, f64) {
+        if self.len() == 1 {
+            return (0, u);
+        }
         let last = self.len() - 1;
         let mut index = self.cumulative.partition_point(|c| *c <= u).saturating_sub(1).min(last);
         while index > 0 && self.pdf(index) == 0.0 {

@@ -99,7 +99,7 @@ impl Builder {
             return Err(SceneError::VertexOutOfRange { index: *index, vertices: mesh.positions.len() });
         }
         let corner = |i: u32| mesh.positions[i as usize].as_dvec3();
-        let surface = |()| Surface::triangles(mesh.triangles.iter().map(|t| t.map(corner)).collect());
+        let surface = |()| Surface::triangles(mesh.triangles.iter().map(|t| t.map(corner)));
         let shape = self.shape(bsdf, radiance, surface)?;
         let base = self.vertices.len() as u32;
         self.triangles.extend(mesh.triangles.iter().map(|t| t.map(|i| i + base)));
@@ -166,7 +166,11 @@ impl Builder {
     /// Triangles without area have no normal; no ray hits them.
     fn face(&self, triangle: &[u32; 3]) -> Face {
         let [a, b, c] = triangle.map(|i| self.vertices[i as usize].as_dvec3());
-        Face { normal: geometric_normal(a, b, c).unwrap_or(DVec3::Z), offset: offset::of_triangle(a, b, c) }
+        Face {
+            normal: geometric_normal(a, b, c).unwrap_or(DVec3::Z),
+            offset: offset::of_triangle(a, b, c),
+            smooth: triangle.iter().any(|i| self.normals[*i as usize] != Vec3::ZERO),
+        }
     }
 
     /// The scene as seen by `camera`. Builds the acceleration structure.

@@ -37,6 +37,8 @@ struct Face {
     normal: DVec3,
     /// Distance by which rays are started off the triangle.
     offset: f64,
+    /// Whether its vertices have normals.
+    smooth: bool,
 }
 
 /// A scene, ready to render.
@@ -81,12 +83,10 @@ impl Scene {
         let corners = self.triangles[index];
         let [a, b, c] = corners.map(|i| self.vertices[i as usize].as_dvec3());
         let w = 1.0 - u - v;
-        let Face { normal, offset } = self.faces[index];
-        let [na, nb, nc] = corners.map(|i| self.normals[i as usize].as_dvec3());
-        let interpolated = na * w + nb * u + nc * v;
-        let length_squared = interpolated.length_squared();
-        let (geometric, shading) = if length_squared > 0.0 {
-            let shading = interpolated / length_squared.sqrt();
+        let Face { normal, offset, smooth } = self.faces[index];
+        let (geometric, shading) = if smooth {
+            let [na, nb, nc] = corners.map(|i| self.normals[i as usize].as_dvec3());
+            let shading = (na * w + nb * u + nc * v).normalize_or(normal);
             (if normal.dot(shading) < 0.0 { -normal } else { normal }, shading)
         } else {
             (normal, normal)
