@@ -4,8 +4,8 @@
 
 use glam::{DVec2, DVec3};
 use pathblend::emitter::Start;
-use pathblend::geometry::Ray;
 use pathblend::load::{self, Loaded, Options};
+use pathblend::scene::Caster;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -46,7 +46,7 @@ fn shapes_lie_and_face_as_in_mitsuba() {
     let mut hits = 0;
     for case in expected("shapes") {
         let (origin, direction) = (vector(&case["origin"]), vector(&case["direction"]).normalize());
-        let surface = scene.intersect(&Ray { origin, direction, tmax: f64::INFINITY });
+        let surface = Caster::new(&scene).intersect(origin, direction);
         assert_eq!(surface.is_some(), case.get("position").is_some(), "{case}");
         let Some(surface) = surface else { continue };
         hits += 1;

@@ -121,3 +121,14 @@ fn deep_nesting_is_refused() {
         assert!(!bench.scene(format!("<scene version=\"3.0.0\">{deep}</scene>").as_bytes()));
     }
 }
+
+/// Coordinates up to the largest that are accepted, down to the smallest, and faces without area.
+#[test]
+fn extreme_meshes_do_not_panic() {
+    let bench = Bench::new();
+    for scale in [1e18, 1e-18, 1e-38, 1e-45, 0.0] {
+        let mesh = format!("v 0 0 0\nv {scale:e} 0 0\nv 0 {scale:e} 0\n{}", "f 1 2 3\nf 1 1 1\n".repeat(200));
+        assert!(bench.mesh("obj", mesh.as_bytes()), "{scale:e}");
+    }
+    assert!(!bench.mesh("obj", b"v 0 0 0\nv 1e19 0 0\nv 0 1 0\nf 1 2 3\n"));
+}

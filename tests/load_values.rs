@@ -5,9 +5,8 @@
 use glam::DVec3;
 use pathblend::bsdf::{Bsdf, Conductor, Dielectric, Diffuse, Distribution, Microfacet, RoughConductor};
 use pathblend::film::Filter;
-use pathblend::geometry::Ray;
 use pathblend::load::{self, Options, UNBOUNDED_DEPTH};
-use pathblend::scene::Scene;
+use pathblend::scene::{Caster, Scene};
 use pathblend::spectrum::Spectrum;
 
 const SENSOR: &str = "<sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/></sensor>";
@@ -119,8 +118,8 @@ fn film_and_depth_are_taken() {
 fn transformations_apply_in_order() {
     let steps = "<scale value=\"0.5\"/><translate x=\"1\"/><rotate z=\"2\" angle=\"90\"/><translate z=\"3\"/>";
     let scene = load(&format!("<shape type=\"sphere\"><transform name=\"to_world\">{steps}</transform></shape>"));
-    let ray = Ray { origin: DVec3::new(0.0, 1.0, 9.0), direction: -DVec3::Z, tmax: f64::INFINITY };
-    let position = scene.intersect(&ray).map(|surface| surface.position);
+    let hit = Caster::new(&scene).intersect(DVec3::new(0.0, 1.0, 9.0), -DVec3::Z);
+    let position = hit.map(|surface| surface.position);
     assert!(position.is_some_and(|p| (p - DVec3::new(0.0, 1.0, 3.5)).length() < 1e-12), "{position:?}");
 }
 
