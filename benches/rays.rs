@@ -52,7 +52,9 @@ fn quad(mesh: &mut Mesh, corner: Vec3, a: Vec3, b: Vec3) {
 fn room() -> Mesh {
     let mut mesh = Mesh::default();
     let mut block = |corner: Vec3, a: Vec3, b: Vec3, c: Vec3| {
-        for (p, s, t) in [(corner, a, b), (corner, b, c), (corner, c, a), (corner + c, a, b), (corner + a, b, c), (corner + b, c, a)] {
+        for (p, s, t) in
+            [(corner, a, b), (corner, b, c), (corner, c, a), (corner + c, a, b), (corner + a, b, c), (corner + b, c, a)]
+        {
             quad(&mut mesh, p, s, t);
         }
     };
@@ -62,12 +64,16 @@ fn room() -> Mesh {
     mesh
 }
 
-/// A bumpy sphere of `2 rings (rings - 1)·2` triangles.
+/// A bumpy sphere of `4 rings²` triangles.
 fn bumpy_sphere(rings: u32) -> Mesh {
     let columns = 2 * rings;
     let point = |i: u32, j: u32| {
-        let (theta, phi) = (std::f64::consts::PI * f64::from(i) / f64::from(rings), std::f64::consts::TAU * f64::from(j) / f64::from(columns));
-        let radius = 1.0 + 0.05 * (17.0 * theta).sin() * (23.0 * phi).cos() + 0.01 * (91.0 * theta).cos() * (83.0 * phi).sin();
+        let (theta, phi) = (
+            std::f64::consts::PI * f64::from(i) / f64::from(rings),
+            std::f64::consts::TAU * f64::from(j) / f64::from(columns),
+        );
+        let radius =
+            1.0 + 0.05 * (17.0 * theta).sin() * (23.0 * phi).cos() + 0.01 * (91.0 * theta).cos() * (83.0 * phi).sin();
         (radius * DVec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin())).as_vec3()
     };
     let vertices = (0..=rings).flat_map(|i| (0..columns).map(move |j| point(i, j))).collect();
@@ -75,7 +81,10 @@ fn bumpy_sphere(rings: u32) -> Mesh {
     let triangles = (0..rings)
         .flat_map(|i| {
             (0..columns).flat_map(move |j| {
-                [[index(i, j), index(i, j + 1), index(i + 1, j)], [index(i, j + 1), index(i + 1, j + 1), index(i + 1, j)]]
+                [
+                    [index(i, j), index(i, j + 1), index(i + 1, j)],
+                    [index(i, j + 1), index(i + 1, j + 1), index(i + 1, j)],
+                ]
             })
         })
         .collect();
@@ -137,7 +146,9 @@ fn measure(criterion: &mut Criterion<CpuTime>, scene: &str, mesh: &Mesh, eye: DV
         (0..1 << 18).map(|_| Ray::new(0.9 * size * unit(&mut rng) * rng.random::<f64>(), unit(&mut rng))).collect();
     let mut group = criterion.benchmark_group(scene);
     group.sample_size(10).warm_up_time(Duration::from_millis(500)).measurement_time(Duration::from_secs(2));
-    for (name, rays) in [("primary", &camera), ("first bounce", &first), ("second bounce", &second), ("random", &random)] {
+    for (name, rays) in
+        [("primary", &camera), ("first bounce", &first), ("second bounce", &second), ("random", &random)]
+    {
         group.throughput(Throughput::Elements(rays.len() as u64));
         group.bench_with_input(BenchmarkId::new("closest", name), rays, |bench, rays| {
             bench.iter(|| rays.iter().map(|ray| bvh.intersect(black_box(ray)).map_or(0.0, |hit| hit.t)).sum::<f64>());

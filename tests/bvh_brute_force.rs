@@ -11,7 +11,10 @@ fn in_cube(rng: &mut Rng) -> DVec3 {
 }
 
 fn unit(rng: &mut Rng) -> DVec3 {
-    std::iter::repeat_with(|| in_cube(rng)).find(|p| p.length_squared() <= 1.0 && p.length_squared() > 1e-3).unwrap().normalize()
+    std::iter::repeat_with(|| in_cube(rng))
+        .find(|p| p.length_squared() <= 1.0 && p.length_squared() > 1e-3)
+        .unwrap()
+        .normalize()
 }
 
 struct Scene {
@@ -31,9 +34,17 @@ impl Scene {
         let solids = (0..solids).map(|i| {
             let center = scale * in_cube(rng) + shift;
             let radius = scale * rng.random_range(0.01..0.3);
-            if i % 2 == 0 { Solid::Sphere { center, radius } } else { Solid::Disk { center, normal: unit(rng), radius } }
+            if i % 2 == 0 {
+                Solid::Sphere { center, radius }
+            } else {
+                Solid::Disk { center, normal: unit(rng), radius }
+            }
         });
-        Self { solids: solids.collect(), vertices, triangles: (0..triangles).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect() }
+        Self {
+            solids: solids.collect(),
+            vertices,
+            triangles: (0..triangles).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+        }
     }
 
     fn corners(&self, index: usize) -> [DVec3; 3] {
@@ -150,9 +161,16 @@ fn empty_scene_hits_nothing() {
 fn unusable_primitives_are_dropped_and_counted() {
     let (nan, inf) = (f32::NAN, f32::INFINITY);
     let vertices = [
-        Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::splat(nan), Vec3::new(inf, 0.0, 0.0), Vec3::new(0.0, 1e30, 0.0), Vec3::new(2.0, 0.0, 0.0),
+        Vec3::ZERO,
+        Vec3::X,
+        Vec3::Y,
+        Vec3::splat(nan),
+        Vec3::new(inf, 0.0, 0.0),
+        Vec3::new(0.0, 1e30, 0.0),
+        Vec3::new(2.0, 0.0, 0.0),
     ];
-    let triangles = [[0, 1, 2], [3, 3, 3], [0, 1, 3], [4, 1, 2], [0, 5, 1], [0, 1, 99], [0, 1, 6], [0, 0, 1], [2, 1, 0]];
+    let triangles =
+        [[0, 1, 2], [3, 3, 3], [0, 1, 3], [4, 1, 2], [0, 5, 1], [0, 1, 99], [0, 1, 6], [0, 0, 1], [2, 1, 0]];
     let solids = [
         Solid::Sphere { center: DVec3::splat(f64::NAN), radius: 1.0 },
         Solid::Sphere { center: DVec3::ZERO, radius: -1.0 },

@@ -85,7 +85,10 @@ fn a_wall_slightly_farther_is_met() {
     for scale in [1e-4f32, 1.0, 1e4] {
         // Two walls as close to each other as f32 coordinates allow.
         let (near, far) = (0.75 * scale, (0.75 * scale).next_up());
-        let wall = |z: f32| [Vec3::new(-1.0, -1.0, 0.0), Vec3::new(1.0, -1.0, 0.0), Vec3::new(0.0, 1.0, 0.0)].map(|v| v * scale + Vec3::Z * z);
+        let wall = |z: f32| {
+            [Vec3::new(-1.0, -1.0, 0.0), Vec3::new(1.0, -1.0, 0.0), Vec3::new(0.0, 1.0, 0.0)]
+                .map(|v| v * scale + Vec3::Z * z)
+        };
         let vertices = [wall(near), wall(far)].concat();
         let bvh = Bvh::build(&vertices, &[[0, 1, 2], [3, 4, 5]], &[]);
         let [a, b, c] = wall(near).map(Vec3::as_dvec3);
