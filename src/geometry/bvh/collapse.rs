@@ -242,9 +242,9 @@ mod tests {
     fn chain(boxes: &[Aabb]) -> Bvh2 {
         let around = |i: usize| boxes[i..].iter().fold(Aabb::INVALID, |a, b| a.union(b));
         let mut nodes = vec![Bvh2Node::new(around(0), 0, 1)];
-        for i in 0..boxes.len() - 2 {
+        for (i, leaf) in boxes.iter().enumerate().take(boxes.len() - 2) {
             let next = nodes.len() as u32 + 2;
-            nodes.extend([Bvh2Node::new(boxes[i], 1, i as u32), Bvh2Node::new(around(i + 1), 0, next)]);
+            nodes.extend([Bvh2Node::new(*leaf, 1, i as u32), Bvh2Node::new(around(i + 1), 0, next)]);
         }
         nodes.extend([boxes.len() - 2, boxes.len() - 1].map(|i| Bvh2Node::new(boxes[i], 1, i as u32)));
         let mut tree = Bvh2::zeroed(0);
