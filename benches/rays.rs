@@ -64,7 +64,7 @@ fn room() -> Mesh {
     mesh
 }
 
-/// A bumpy sphere of `2 rings (rings - 1)·2` triangles.
+/// A bumpy sphere of `4 rings²` triangles.
 fn bumpy_sphere(rings: u32) -> Mesh {
     let columns = 2 * rings;
     let point = |i: u32, j: u32| {

@@ -113,7 +113,8 @@ fn sphere_roots(center: DVec3, radius: f64, ray: &Ray) -> Option<[f64; 2]> {
     let b = -to_origin.dot(ray.direction);
     let nearest = to_origin + b * ray.direction;
     let discriminant = radius * radius - nearest.length_squared();
-    if !(discriminant >= 0.0) {
+    // One that is not a number gives roots that are not, which no interval contains.
+    if discriminant < 0.0 {
         return None;
     }
     let distance = to_origin.length();

@@ -10,12 +10,17 @@ use obvhs::ploc::PlocBuilder;
 use super::collapse::{Primitives, collapse};
 use super::frame::Frame;
 use super::groups::Groups;
+use super::packet::Packet;
+use super::traverse::FLAT_PACKETS;
 use super::{Bvh, Dropped};
 use crate::geometry::offset::cross;
 use crate::geometry::{Bounds, Solid};
 
 /// Beyond this a coordinate is taken for an error: one such vertex would cost all others their resolution.
 const LARGEST: f64 = 1e15;
+
+/// The most solids that do without nodes.
+const LOOSE_SOLIDS: usize = 4;
 
 /// See [`Bvh::build`].
 pub fn build(vertices: &[Vec3], triangles: &[[u32; 3]], solids: &[Solid]) -> Bvh {
@@ -42,21 +47,18 @@ pub fn build(vertices: &[Vec3], triangles: &[[u32; 3]], solids: &[Solid]) -> Bvh
     // Exact, by the choice of the frame.
     let to_local = |corner: Vec3| frame.to_local(corner.as_dvec3()).as_vec3();
     let local: Vec<(u32, [Vec3; 3])> = kept.into_iter().map(|(id, corners)| (id, corners.map(to_local))).collect();
+    let solids = solids.to_vec();
+    if local.len() <= 8 * FLAT_PACKETS && kept_solids.len() <= LOOSE_SOLIDS {
+        let packets = local.chunks(8).map(Packet::new).collect();
+        return Bvh { frame, bounds, dropped, nodes: Vec::new(), packets, solids, loose: kept_solids, stack: 0 };
+    }
     let mut boxes: Vec<Aabb> = local.iter().map(|(_, corners)| triangle_box(corners)).collect();
     boxes.extend(kept_solids.iter().map(|id| solid_box(&solids[*id as usize], &frame)));
-
     let groups = Groups::of_equal(&boxes);
     let tree = binary(&groups.firsts().map(|first| boxes[first as usize]).collect::<Vec<_>>());
     let wide = collapse(&tree, &Primitives { boxes: &boxes, groups: &groups, triangles: &local, solids: &kept_solids });
-    Bvh {
-        frame,
-        bounds,
-        dropped,
-        nodes: wide.nodes,
-        packets: wide.packets,
-        solids: solids.to_vec(),
-        stack: 7 * wide.depth + 1,
-    }
+    let stack = 7 * wide.depth + 1;
+    Bvh { frame, bounds, dropped, nodes: wide.nodes, packets: wide.packets, solids, loose: Vec::new(), stack }
 }
 
 /// The corners, unless they are to be dropped, which is counted.

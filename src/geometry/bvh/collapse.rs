@@ -215,8 +215,8 @@ impl Emitter<'_> {
         if let Some(solid) = list.first().and_then(|i| (*i as usize).checked_sub(count)) {
             return Child::solid(self.primitives.solids[solid]);
         }
-        let triangles = list.iter().map(|i| &self.primitives.triangles[*i as usize]);
-        self.wide.packets.push(Packet::new(triangles.map(|(id, corners)| (*id, corners))));
+        let triangles: Vec<_> = list.iter().map(|i| self.primitives.triangles[*i as usize]).collect();
+        self.wide.packets.push(Packet::new(&triangles));
         Child::packet(self.wide.packets.len() - 1)
     }
 
@@ -227,5 +227,61 @@ impl Emitter<'_> {
         }
         let parts: Vec<Root> = list.chunks(list.len().div_ceil(8)).map(|part| Root::List(part.to_vec())).collect();
         self.node(&parts, level + 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+    use super::super::wide::ChildKind;
+    use super::*;
+    use glam::Vec3A;
+    use obvhs::bvh2::node::Bvh2Node;
+
+    /// Nested boxes in a chain as deep as there are primitives: every inner node is a leaf and the rest.
+    fn chain(boxes: &[Aabb]) -> Bvh2 {
+        let around = |i: usize| boxes[i..].iter().fold(Aabb::INVALID, |a, b| a.union(b));
+        let mut nodes = vec![Bvh2Node::new(around(0), 0, 1)];
+        for (i, leaf) in boxes.iter().enumerate().take(boxes.len() - 2) {
+            let next = nodes.len() as u32 + 2;
+            nodes.extend([Bvh2Node::new(*leaf, 1, i as u32), Bvh2Node::new(around(i + 1), 0, next)]);
+        }
+        nodes.extend([boxes.len() - 2, boxes.len() - 1].map(|i| Bvh2Node::new(boxes[i], 1, i as u32)));
+        let mut tree = Bvh2::zeroed(0);
+        (tree.nodes, tree.primitive_indices) = (nodes, (0..boxes.len() as u32).collect());
+        tree
+    }
+
+    fn depth(wide: &Wide, node: usize, packets: &mut [u32]) -> usize {
+        let deeper = wide.nodes[node].children.iter().map(|child| match child.kind() {
+            // Lanes without a child name the root.
+            ChildKind::Node(0) | ChildKind::Solid(_) => 0,
+            ChildKind::Node(index) => depth(wide, index, packets),
+            ChildKind::Packet(index) => {
+                packets[index] += 1;
+                0
+            }
+        });
+        1 + deeper.max().unwrap()
+    }
+
+    #[test]
+    fn a_deep_chain_stays_within_the_stack() {
+        let triangles: Vec<(u32, [Vec3; 3])> = (0..3000u16)
+            .map(|i| (u32::from(i), [Vec3::ZERO, Vec3::X, Vec3::ONE].map(|v| v * 1.01f32.powi(-i32::from(i)))))
+            .collect();
+        let boxes: Vec<Aabb> = triangles.iter().map(|(_, t)| Aabb::new(Vec3A::ZERO, Vec3A::from(t[2]))).collect();
+        let groups = Groups::of_equal(&boxes);
+        let ordered: Vec<Aabb> = groups.firsts().map(|i| boxes[i as usize]).collect();
+        let primitives = Primitives { boxes: &boxes, groups: &groups, triangles: &triangles, solids: &[] };
+        let wide = collapse(&chain(&ordered), &primitives);
+        let mut uses = vec![0; wide.packets.len()];
+        assert_eq!(depth(&wide, 0, &mut uses), wide.depth);
+        assert!(wide.depth > PLANNED_DEPTH && wide.depth <= MAX_DEPTH, "{}", wide.depth);
+        assert!(uses.iter().all(|n| *n == 1));
+        let mut ids: Vec<u32> = wide.packets.iter().flat_map(|p| p.ids).collect();
+        ids.sort_unstable();
+        ids.dedup();
+        assert_eq!(ids.len(), 3000);
     }
 }

@@ -3,6 +3,8 @@
 //! The walk: [`build`] drops what cannot be hit, puts equal boxes together ([`groups`]) and lets obvhs build a binary hierarchy, [`collapse`] turns it into wide
 //! nodes ([`wide`]) and packets ([`packet`]), [`traverse`] carries a ray's constants ([`query`]) through them.
 //!
+//! A handful of primitives gets no nodes at all: a flat list of packets is faster.
+//!
 //! All of it works in the hierarchy's own [`frame`]: relative to a centre, scaled by a power of two, both chosen so that
 //! no vertex is rounded.
 
@@ -41,7 +43,9 @@ pub struct Bvh {
     nodes: Vec<Node>,
     packets: Vec<Packet>,
     solids: Vec<Solid>,
-    /// The most entries that a traversal can have on its stack.
+    /// Indices of the solids that a hierarchy without nodes tests one by one.
+    loose: Vec<u32>,
+    /// The most entries that a traversal can have on its stack; 0 if there are no nodes.
     stack: usize,
 }
 

@@ -33,11 +33,11 @@ pub struct Refined {
 
 impl Packet {
     /// Up to eight triangles with their indices; further ones are ignored.
-    pub fn new<'a>(triangles: impl Iterator<Item = (u32, &'a [Vec3; 3])>) -> Self {
+    pub fn new(triangles: &[(u32, [Vec3; 3])]) -> Self {
         let mut lanes = [[[f32::NAN; 8]; 3]; 3];
         let (mut ids, mut magnitude, mut edge) = ([0; 8], 0f32, 0f32);
-        for (lane, (id, triangle)) in triangles.enumerate().take(8) {
-            ids[lane] = id;
+        for (lane, (id, triangle)) in triangles.iter().enumerate().take(8) {
+            ids[lane] = *id;
             for (vertex, point) in triangle.iter().enumerate() {
                 for axis in 0..3 {
                     lanes[vertex][axis][lane] = point[axis];
@@ -97,9 +97,12 @@ impl Packet {
         let corners = self.corners(lane, query);
         let relative = |p: [f64; 3]| minus(p, query.origin);
         let [ra, rb, rc] = [relative(corners[0]), relative(corners[1]), relative(corners[2])];
-        // First the plane: most candidates that fail are the surface that the ray leaves.
         let [za, zb, zc] = [ra[2] * query.shear[2], rb[2] * query.shear[2], rc[2] * query.shear[2]];
         let (least, most) = (lesser(za, lesser(zb, zc)), greater(za, greater(zb, zc)));
+        if least >= limit {
+            return None;
+        }
+        // First the plane: most candidates that fail are the surface that the ray leaves.
         let normal = cross(minus(corners[1], corners[0]), minus(corners[2], corners[0]));
         let (height, slope) = (dot(normal, ra), dot(normal, query.direction));
         if least <= 0.0 && height * slope.signum() <= 0.0 {
@@ -119,7 +122,7 @@ impl Packet {
         // the least of them.
         let t = lesser(greater(height / slope, least), most);
         let inverse = 1.0 / determinant;
-        (t > 0.0 && t < limit).then(|| Refined { t, u: v * inverse, v: w * inverse })
+        (t > 0.0 && t < limit).then_some(Refined { t, u: v * inverse, v: w * inverse })
     }
 
     /// The corners of one triangle, axes permuted as the query's.

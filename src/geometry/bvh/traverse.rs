@@ -1,6 +1,7 @@
 //! The walk of a ray through the hierarchy. Nothing is allocated.
 
 use super::Bvh;
+use super::packet::Packet;
 use super::query::Query;
 use super::wide::{Child, ChildKind};
 use crate::geometry::{Primitive, Ray};
@@ -10,6 +11,9 @@ pub const MAX_DEPTH: usize = 36;
 /// Each level leaves at most seven siblings behind, and the last one eight.
 const FULL_STACK: usize = 256;
 const _: () = assert!(7 * MAX_DEPTH < FULL_STACK);
+
+/// The most packets that do without nodes: one bit for each of their triangles.
+pub const FLAT_PACKETS: usize = 8;
 
 /// The closest hit so far.
 pub struct Best {
@@ -49,10 +53,33 @@ impl Bvh {
     pub(super) fn dispatch<const ANY: bool>(&self, ray: &Ray) -> Option<Best> {
         let query = Query::new(ray, &self.frame)?;
         Some(match self.stack {
-            0..=16 => self.traverse::<ANY, 16>(&query, ray),
-            17..=64 => self.traverse::<ANY, 64>(&query, ray),
+            0 => self.flat::<ANY>(&query, ray),
+            1..=64 => self.traverse::<ANY, 64>(&query, ray),
             _ => self.traverse::<ANY, FULL_STACK>(&query, ray),
         })
+    }
+
+    /// Without nodes: all packets are filtered, then all candidates refined. No branch until then depends on the ray,
+    /// which for a few packets is faster than any hierarchy.
+    #[inline(always)]
+    fn flat<const ANY: bool>(&self, query: &Query, ray: &Ray) -> Best {
+        let mut best = Best::new(query);
+        let mut candidates = 0u64;
+        for (index, packet) in self.packets.iter().enumerate().take(FLAT_PACKETS) {
+            candidates |= u64::from(packet.filter(query, best.t32)) << (8 * index);
+        }
+        while candidates != 0 && !(ANY && best.primitive.is_some()) {
+            let bit = candidates.trailing_zeros() as usize;
+            candidates &= candidates - 1;
+            refine(&self.packets[bit / 8], bit % 8, query, &mut best);
+        }
+        for solid in &self.loose {
+            if ANY && best.primitive.is_some() {
+                break;
+            }
+            self.visit_solid(*solid, query, ray, &mut best);
+        }
+        best
     }
 
     #[inline(always)]
@@ -93,16 +120,10 @@ impl Bvh {
     fn visit_packet<const ANY: bool>(&self, index: usize, query: &Query, best: &mut Best) {
         let packet = &self.packets[index];
         let mut mask = packet.filter(query, best.t32);
-        while mask != 0 {
+        while mask != 0 && !(ANY && best.primitive.is_some()) {
             let lane = mask.trailing_zeros() as usize;
             mask &= mask - 1;
-            if let Some(hit) = packet.refine(lane, query, best.t) {
-                best.set(query, hit.t);
-                best.primitive = Some(Primitive::Triangle { index: packet.ids[lane & 7], u: hit.u, v: hit.v });
-                if ANY {
-                    return;
-                }
-            }
+            refine(packet, lane, query, best);
         }
     }
 
@@ -114,6 +135,15 @@ impl Bvh {
             best.set(query, t * self.frame.scale);
             best.primitive = Some(Primitive::Solid { index });
         }
+    }
+}
+
+/// Makes a candidate the best hit if it is.
+#[inline(always)]
+fn refine(packet: &Packet, lane: usize, query: &Query, best: &mut Best) {
+    if let Some(hit) = packet.refine(lane, query, best.t) {
+        best.set(query, hit.t);
+        best.primitive = Some(Primitive::Triangle { index: packet.ids[lane & 7], u: hit.u, v: hit.v });
     }
 }
 
