@@ -46,7 +46,7 @@ fn shapes_lie_and_face_as_in_mitsuba() {
     let mut hits = 0;
     for case in expected("shapes") {
         let (origin, direction) = (vector(&case["origin"]), vector(&case["direction"]).normalize());
-        let surface = Caster::new(&scene).intersect(origin, direction);
+        let surface = Caster::new(&scene).intersect(origin.into(), direction);
         assert_eq!(surface.is_some(), case.get("position").is_some(), "{case}");
         let Some(surface) = surface else { continue };
         hits += 1;

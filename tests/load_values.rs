@@ -118,7 +118,7 @@ fn film_and_depth_are_taken() {
 fn transformations_apply_in_order() {
     let steps = "<scale value=\"0.5\"/><translate x=\"1\"/><rotate z=\"2\" angle=\"90\"/><translate z=\"3\"/>";
     let scene = load(&format!("<shape type=\"sphere\"><transform name=\"to_world\">{steps}</transform></shape>"));
-    let hit = Caster::new(&scene).intersect(DVec3::new(0.0, 1.0, 9.0), -DVec3::Z);
+    let hit = Caster::new(&scene).intersect(DVec3::new(0.0, 1.0, 9.0).into(), -DVec3::Z);
     let position = hit.map(|surface| surface.position);
     assert!(position.is_some_and(|p| (p - DVec3::new(0.0, 1.0, 3.5)).length() < 1e-12), "{position:?}");
 }

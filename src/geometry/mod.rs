@@ -15,7 +15,7 @@ mod ray;
 mod solid;
 
 pub use bounds::Bounds;
-pub use bvh::{Bvh, Dropped};
+pub use bvh::{Bvh, Dropped, NO_TRIANGLE};
 pub use hit::{Hit, Primitive};
 pub use offset::geometric_normal;
 pub use ray::Ray;

@@ -7,7 +7,7 @@ use crate::emitter::Start;
 use crate::film::{Band, Film, Kernel, Word};
 use crate::math::{Row, SolidAnglePdf, Stream, Walk};
 use crate::paths::{direct_pdf, sample_direct};
-use crate::scene::{Caster, Scene, Surface};
+use crate::scene::{Caster, Origin, Scene, Surface};
 use crate::spectrum::Spectrum;
 use glam::{DVec2, DVec3};
 
@@ -53,7 +53,7 @@ pub(super) fn film_position(kernel: &Kernel, size: [usize; 2], pixel: [usize; 2]
 
 /// The end of a walk from the camera.
 pub(super) struct State {
-    pub origin: DVec3,
+    pub origin: Origin,
     pub direction: DVec3,
     pub throughput: Spectrum,
     pub word: Word,
@@ -67,7 +67,7 @@ impl State {
     pub(super) fn at_camera(scene: &Scene, film: DVec2, row: Row) -> Self {
         let origin = scene.camera.lens(row);
         let direction = scene.camera.direction(origin, film);
-        Self { origin, direction, throughput: Spectrum::ONE, word: Word::EMPTY, pdf: None }
+        Self { origin: origin.into(), direction, throughput: Spectrum::ONE, word: Word::EMPTY, pdf: None }
     }
 
     /// The walk after `scatter` at `surface`, weighted by `weight`.
@@ -147,7 +147,7 @@ pub(super) fn emission(scene: &Caster<'_>, surface: &Surface, state: &State, pix
         return;
     }
     let weight = state.pdf.map_or(1.0, |pdf| {
-        let distance = surface.position.distance(state.origin);
+        let distance = surface.position.distance(state.origin.point);
         power(pdf, direct_pdf(scene, id, Some((surface.geometric, distance)), state.direction))
     });
     band.add(pixel, state.word.class(), state.throughput * radiance * weight);

@@ -127,7 +127,7 @@ impl Sppm {
                 path::background(scene, &state, pixel, band);
                 return None;
             };
-            distance += surface.position.distance(state.origin);
+            distance += surface.position.distance(state.origin.point);
             path::emission(scene, &surface, &state, pixel, band);
             if edges == self.max_depth {
                 return None;

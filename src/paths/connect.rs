@@ -7,7 +7,7 @@ use crate::bsdf::Evaluation;
 use crate::emitter::{Emitter, Start};
 use crate::film::{PathClass, Word};
 use crate::math::{AreaPdf, Walk};
-use crate::scene::{Caster, EmitterId};
+use crate::scene::{Caster, EmitterId, Origin};
 use crate::spectrum::Spectrum;
 use glam::{DVec2, DVec3};
 
@@ -77,7 +77,7 @@ struct End {
     /// Letters up to and with this end.
     word: Word,
     /// Where the connecting ray starts.
-    origin: DVec3,
+    origin: Origin,
 }
 
 /// How the other end's density follows from this end.
@@ -97,7 +97,7 @@ fn end_of(scene: &Caster<'_>, vertices: &[Vertex], direction: DVec3, walk: Walk)
                 Start::Surface { normal, .. } => (normal.dot(direction), *normal),
                 _ => (1.0, DVec3::ZERO),
             };
-            let origin = end.position + normal * light_offset(end.position);
+            let origin = (end.position + normal * light_offset(end.position)).into();
             let onward = Onward::Light(*id, *start);
             (!value.is_black()).then_some(End { value: value * cos, onward, previous: 0.0, word: Word::EMPTY, origin })
         }
@@ -165,7 +165,7 @@ fn join(
     }
     let clear = match infinite {
         Some(towards) => scene.escapes(camera_end.origin, towards),
-        None => scene.visible(camera_end.origin, light_end.origin),
+        None => scene.visible(camera_end.origin, light_end.origin.point),
     };
     if !clear {
         return None;
@@ -199,7 +199,7 @@ fn reach_camera(
     let importance = scene.camera.direction_pdf(direction);
     let light_end = end_of(scene, light, -direction, Walk::FromLight)?;
     let value = start.throughput * light_end.value * (importance.0 / distance_squared);
-    if value.is_black() || !scene.visible(lens, light_end.origin) {
+    if value.is_black() || !scene.visible(light_end.origin, lens) {
         return None;
     }
     let normal = match &start.kind {

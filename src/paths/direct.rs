@@ -3,7 +3,7 @@
 use super::trace::light_offset;
 use crate::emitter::Start;
 use crate::math::{AreaPdf, Row, SolidAnglePdf};
-use crate::scene::{Caster, EmitterId};
+use crate::scene::{Caster, EmitterId, Origin};
 use crate::spectrum::Spectrum;
 use glam::DVec3;
 
@@ -23,7 +23,7 @@ pub struct Direct {
 impl Direct {
     /// Whether the light reaches `origin`.
     #[inline]
-    pub fn arrives(&self, scene: &Caster<'_>, origin: DVec3) -> bool {
+    pub fn arrives(&self, scene: &Caster<'_>, origin: Origin) -> bool {
         match self.target {
             Some(target) => scene.visible(origin, target),
             None => scene.escapes(origin, self.direction),

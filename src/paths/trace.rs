@@ -6,7 +6,7 @@ use crate::emitter::{Emitter, Start};
 use crate::film::Word;
 use crate::geometry::offset::OFFSET;
 use crate::math::{AreaPdf, Row, SolidAnglePdf, Walk};
-use crate::scene::{Caster, EmitterId, Surface};
+use crate::scene::{Caster, EmitterId, Origin, Surface};
 use crate::spectrum::Spectrum;
 use glam::{DVec2, DVec3};
 
@@ -36,7 +36,7 @@ pub fn trace_camera(
         word: Word::EMPTY,
     });
     let pdf = scene.camera.direction_pdf(direction);
-    let walker = Walker { origin: lens, direction, throughput: Spectrum::ONE, pdf, word: Word::EMPTY };
+    let walker = Walker { origin: lens.into(), direction, throughput: Spectrum::ONE, pdf, word: Word::EMPTY };
     walk(scene, walker, Walk::FromCamera, rows, vertices, roulette_from, path);
 }
 
@@ -61,7 +61,7 @@ pub fn trace_light(
     let Some((origin, direction, weight)) = scene.emitter(id).emit(&start, rows.row(1)) else { return };
     let normal = if let Start::Surface { normal, .. } = start { normal } else { DVec3::ZERO };
     let walker = Walker {
-        origin: origin + normal * light_offset(origin),
+        origin: (origin + normal * light_offset(origin)).into(),
         direction,
         throughput: weight * vertex.throughput,
         pdf: SolidAnglePdf(0.0),
@@ -98,7 +98,7 @@ pub(super) fn light_offset(position: DVec3) -> f64 {
 
 /// The end of a walk that goes on.
 struct Walker {
-    origin: DVec3,
+    origin: Origin,
     direction: DVec3,
     throughput: Spectrum,
     /// Density of `direction`.
@@ -168,7 +168,7 @@ fn walk(
 fn environment_vertex(id: EmitterId, walker: &Walker) -> Vertex {
     Vertex {
         kind: VertexKind::Environment(id),
-        position: walker.origin,
+        position: walker.origin.point,
         back: -walker.direction,
         throughput: walker.throughput,
         forward: AreaPdf(walker.pdf.0),

@@ -1,10 +1,27 @@
 //! Casts rays and counts them.
 
 use super::{Scene, Surface};
-use crate::geometry::Ray;
+use crate::geometry::{NO_TRIANGLE, Ray};
 use glam::DVec3;
 use std::cell::Cell;
 use std::ops::Deref;
+
+/// Where a ray starts.
+#[derive(Clone, Copy, Debug)]
+pub struct Origin {
+    /// The point, moved off the surface that it lies on.
+    pub point: DVec3,
+    /// The triangle that it was on, or [`NO_TRIANGLE`].
+    pub triangle: u32,
+}
+
+impl From<DVec3> for Origin {
+    /// A point that is on no triangle.
+    #[inline]
+    fn from(point: DVec3) -> Self {
+        Self { point, triangle: NO_TRIANGLE }
+    }
+}
 
 /// The scene as one job sees it: every ray that it casts is counted.
 pub struct Caster<'a> {
@@ -25,29 +42,30 @@ impl<'a> Caster<'a> {
 
     /// The closest surface from `origin` along the unit vector `direction`.
     #[inline]
-    pub fn intersect(&self, origin: DVec3, direction: DVec3) -> Option<Surface> {
+    pub fn intersect(&self, origin: Origin, direction: DVec3) -> Option<Surface> {
         self.rays.set(self.rays.get() + 1);
-        self.scene.intersect(&Ray { origin, direction, tmax: f64::INFINITY })
+        self.scene.intersect(&Ray::new(origin.point, direction), origin.triangle)
     }
 
     /// Whether nothing lies between two points, which the caller has moved off their surfaces.
     #[inline]
-    pub fn visible(&self, from: DVec3, to: DVec3) -> bool {
-        let offset = to - from;
+    pub fn visible(&self, from: Origin, to: DVec3) -> bool {
+        let offset = to - from.point;
         let distance = offset.length();
-        !self.occluded(&Ray { origin: from, direction: offset / distance, tmax: distance })
+        let direction = offset * (1.0 / distance);
+        !self.occluded(&Ray { origin: from.point, direction, tmax: distance }, from.triangle)
     }
 
     /// Whether the ray from `origin` along `direction` leaves the scene.
     #[inline]
-    pub fn escapes(&self, origin: DVec3, direction: DVec3) -> bool {
-        !self.occluded(&Ray { origin, direction, tmax: f64::INFINITY })
+    pub fn escapes(&self, origin: Origin, direction: DVec3) -> bool {
+        !self.occluded(&Ray::new(origin.point, direction), origin.triangle)
     }
 
     #[inline]
-    fn occluded(&self, ray: &Ray) -> bool {
+    fn occluded(&self, ray: &Ray, leaving: u32) -> bool {
         self.rays.set(self.rays.get() + 1);
-        self.scene.bvh.occluded(ray)
+        self.scene.bvh.occluded_from(ray, leaving)
     }
 }
 

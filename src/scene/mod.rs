@@ -5,13 +5,13 @@ mod caster;
 mod surface;
 
 pub use builder::{Builder, FilmSpec, Mesh, SceneError, Shine};
-pub use caster::Caster;
+pub use caster::{Caster, Origin};
 pub use surface::Surface;
 
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::emitter::{Emitter, Start};
-use crate::geometry::{Bvh, Primitive, Ray, Solid, SurfacePoint};
+use crate::geometry::{Bvh, NO_TRIANGLE, Primitive, Ray, Solid, SurfacePoint};
 use crate::math::{AreaPdf, Discrete, Frame, Row};
 use glam::{DVec3, Vec3};
 
@@ -70,8 +70,8 @@ pub struct Scene {
 
 impl Scene {
     #[inline]
-    fn intersect(&self, ray: &Ray) -> Option<Surface> {
-        let hit = self.bvh.intersect(ray)?;
+    fn intersect(&self, ray: &Ray, leaving: u32) -> Option<Surface> {
+        let hit = self.bvh.intersect_from(ray, leaving)?;
         Some(match hit.primitive {
             Primitive::Triangle { index, u, v } => self.triangle_surface(index as usize, u, v),
             Primitive::Solid { index } => self.solid_surface(index as usize, ray.at(hit.t)),
@@ -91,19 +91,17 @@ impl Scene {
         } else {
             (normal, normal)
         };
-        self.surface(a * w + b * u + c * v, geometric, shading, offset, self.triangle_shapes[index])
+        let Shape { bsdf, emitter } = self.shapes[self.triangle_shapes[index] as usize];
+        let (position, frame, triangle) = (a * w + b * u + c * v, Frame::around(shading), index as u32);
+        Surface { position, geometric, frame, bsdf, emitter, offset, triangle }
     }
 
     #[inline]
     fn solid_surface(&self, index: usize, near: DVec3) -> Surface {
         let SurfacePoint { position, normal, offset, .. } = self.solids[index].surface_point(near);
-        self.surface(position, normal, normal, offset, self.solid_shapes[index])
-    }
-
-    #[inline]
-    fn surface(&self, position: DVec3, geometric: DVec3, shading: DVec3, offset: f64, shape: u32) -> Surface {
-        let Shape { bsdf, emitter } = self.shapes[shape as usize];
-        Surface { position, geometric, frame: Frame::around(shading), bsdf, emitter, offset }
+        let Shape { bsdf, emitter } = self.shapes[self.solid_shapes[index] as usize];
+        let frame = Frame::around(normal);
+        Surface { position, geometric: normal, frame, bsdf, emitter, offset, triangle: NO_TRIANGLE }
     }
 
     /// The scattering model `id`.

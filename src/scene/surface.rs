@@ -1,6 +1,6 @@
 //! A point on a surface, with everything that scattering there needs.
 
-use super::{BsdfId, EmitterId};
+use super::{BsdfId, EmitterId, Origin};
 use crate::math::Frame;
 use glam::DVec3;
 
@@ -19,13 +19,16 @@ pub struct Surface {
     pub emitter: Option<EmitterId>,
     /// Distance by which rays are started off the surface.
     pub offset: f64,
+    /// Index of the triangle that it lies on, or [`crate::geometry::NO_TRIANGLE`].
+    pub triangle: u32,
 }
 
 impl Surface {
     /// Where a ray starts that leaves towards `direction`: moved off the surface by more than the rounding errors of
     /// its position, on the side that the ray goes to.
     #[inline]
-    pub fn leave(&self, direction: DVec3) -> DVec3 {
-        self.position + self.geometric * self.offset.copysign(self.geometric.dot(direction))
+    pub fn leave(&self, direction: DVec3) -> Origin {
+        let point = self.position + self.geometric * self.offset.copysign(self.geometric.dot(direction));
+        Origin { point, triangle: self.triangle }
     }
 }

@@ -24,6 +24,9 @@ use frame::Frame;
 use packet::Packet;
 use wide::Node;
 
+/// The index of no triangle: for rays that start on something else.
+pub const NO_TRIANGLE: u32 = u32::MAX;
+
 /// Triangles and solids that a hierarchy left out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Dropped {
@@ -60,14 +63,27 @@ impl Bvh {
     /// The closest hit with `0 < t < tmax`.
     #[must_use]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        let best = self.dispatch::<false>(ray)?;
-        best.primitive.map(|primitive| Hit { t: best.t * self.frame.inverse, primitive })
+        self.intersect_from(ray, NO_TRIANGLE)
     }
 
     /// Whether anything lies at `0 < t < tmax`: the same answer as `intersect(ray).is_some()`, sooner.
     #[must_use]
     pub fn occluded(&self, ray: &Ray) -> bool {
-        self.dispatch::<true>(ray).is_some_and(|best| best.primitive.is_some())
+        self.occluded_from(ray, NO_TRIANGLE)
+    }
+
+    /// As [`Bvh::intersect`], for a ray that starts on the triangle `leaving` and so cannot meet it again: it is not
+    /// looked at, which saves the exact test that most rays from a surface would otherwise fail.
+    #[must_use]
+    pub fn intersect_from(&self, ray: &Ray, leaving: u32) -> Option<Hit> {
+        let best = self.dispatch::<false>(ray, leaving)?;
+        best.primitive.map(|primitive| Hit { t: best.t * self.frame.inverse, primitive })
+    }
+
+    /// As [`Bvh::occluded`], for a ray that starts on the triangle `leaving`.
+    #[must_use]
+    pub fn occluded_from(&self, ray: &Ray, leaving: u32) -> bool {
+        self.dispatch::<true>(ray, leaving).is_some_and(|best| best.primitive.is_some())
     }
 
     /// The box around all that was not dropped; empty for an empty scene.

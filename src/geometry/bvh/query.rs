@@ -36,6 +36,8 @@ pub struct Query {
     pub shear32: [f32; 3],
     /// The origin in `f32`, x and y sheared.
     pub origin32: [f32; 3],
+    /// The triangle that the ray starts from, which it cannot meet again; [`crate::geometry::NO_TRIANGLE`] for none.
+    pub leaving: u32,
     /// For the box test.
     pub slabs: Slabs,
 }
@@ -43,7 +45,7 @@ pub struct Query {
 impl Query {
     /// `None` if the ray cannot hit anything: it is not a ray (see [`Ray`]), or misses the frame's box.
     #[inline(always)]
-    pub fn new(ray: &Ray, frame: &Frame) -> Option<Self> {
+    pub fn new(ray: &Ray, leaving: u32, frame: &Frame) -> Option<Self> {
         let origin = frame.to_local(ray.origin);
         let length = ray.direction.length_squared();
         let tmax = ray.tmax * frame.scale;
@@ -70,6 +72,7 @@ impl Query {
         let shear = [direction[0] * unit, direction[1] * unit, unit];
         let slabs = Slabs::new(ray.direction, point, slack);
         Some(Self {
+            leaving,
             axes,
             origin: permute(origin),
             direction,

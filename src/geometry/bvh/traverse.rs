@@ -50,8 +50,8 @@ const fn entry(t: f32, child: Child) -> u64 {
 impl Bvh {
     /// The closest hit, or with `ANY` the first one met. Small hierarchies get a small stack, which costs less to clear.
     #[inline(always)]
-    pub(super) fn dispatch<const ANY: bool>(&self, ray: &Ray) -> Option<Best> {
-        let query = Query::new(ray, &self.frame)?;
+    pub(super) fn dispatch<const ANY: bool>(&self, ray: &Ray, leaving: u32) -> Option<Best> {
+        let query = Query::new(ray, leaving, &self.frame)?;
         Some(match self.stack {
             0 => self.flat::<ANY>(&query, ray),
             1..=64 => self.traverse::<ANY, 64>(&query, ray),
@@ -141,6 +141,9 @@ impl Bvh {
 /// Makes a candidate the best hit if it is.
 #[inline(always)]
 fn refine(packet: &Packet, lane: usize, query: &Query, best: &mut Best) {
+    if packet.ids[lane & 7] == query.leaving {
+        return;
+    }
     if let Some(hit) = packet.refine(lane, query, best.t) {
         best.set(query, hit.t);
         best.primitive = Some(Primitive::Triangle { index: packet.ids[lane & 7], u: hit.u, v: hit.v });
