@@ -30,7 +30,7 @@ SPP = {
     "ring": 8192,
     "lamp": 4096,
     "gallery": 2048,
-    "pool": 4096,
+    "pool": 8192,
     "bokeh": 4096,
 }
 
