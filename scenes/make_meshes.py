@@ -98,7 +98,7 @@ def knot(p, q, radius, swing, thick, nu, nv):
 
 def wave(x, z):
     """Height of the pool's surface over its mean level, and the slopes dy/dx and dy/dz."""
-    trains = [(4.1, 1.7, 0.3, 0.016), (-2.3, 5.2, 1.9, 0.013), (6.3, -4.4, 4.0, 0.007), (1.5, 7.9, 2.6, 0.006)]
+    trains = [(7.3, 3.1, 0.3, 0.036), (-4.1, 8.6, 1.9, 0.030), (9.5, -6.9, 4.0, 0.015), (2.2, 12.1, 2.6, 0.013)]
     y = dx = dz = 0.0
     for kx, kz, phase, height in trains:
         a = kx * x + kz * z + phase
@@ -190,7 +190,7 @@ def main():
         "ring/ring.ply": ring(0.92, 1.0, 0.42, 0.03, 160, 4),
         "gallery/knot.ply": knot(2, 3, 0.26, 0.11, 0.05, 192, 12),
         "gallery/hoop.ply": torus(0.3, 0.05, 48, 16),
-        "pool/water.obj": water(1.05, 1.45, -0.05, 0.6, 44),
+        "pool/water.obj": water(1.05, 1.45, -0.05, 0.6, 50),
     }
     for name, mesh in meshes.items():
         check(*mesh)
