@@ -1,0 +1,225 @@
+//! The methods on the scenes of this repository: against Mitsuba 3, against each other class by class, and against
+//! themselves on other numbers of threads.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use pathblend::image::{Image, Layer, luminance};
+use pathblend::integrators::{Budget, Method, Settings, render};
+use pathblend::load;
+use pathblend::scene::Scene;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+const SCENES: [&str; 10] = ["box", "spheres", "plates", "door", "torus", "ring", "lamp", "gallery", "pool", "bokeh"];
+const METHODS: [Method; 4] = [Method::Path, Method::Bdpt, Method::Sppm, Method::Mmlt];
+/// Side of the references, and of the tiles that they are compared in.
+const SIDE: usize = 64;
+const TILE: usize = 16;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn scene(name: &str, size: [usize; 2]) -> Scene {
+    let file = root().join("scenes").join(name).join("scene.xml");
+    let options = load::Options { size: Some(size), ..load::Options::default() };
+    let mut scene = load::read(&file, &options).expect("own scenes load").scene;
+    scene.max_depth = 9;
+    scene
+}
+
+fn image(scene: &Scene, method: Method, seed: u64, passes: u64) -> Image {
+    let settings = Settings { seed, max_depth: scene.max_depth, features: true, budget: Budget::Passes(passes) };
+    render(scene, method, &settings, |_| {}).image
+}
+
+/// Mean luminance of each tile.
+fn tiles(colour: &ndarray::Array3<f32>) -> Vec<f64> {
+    let per_side = SIDE / TILE;
+    let mut sums = vec![0.0; per_side * per_side];
+    for y in 0..SIDE {
+        for x in 0..SIDE {
+            let pixel = luminance([colour[[y, x, 0]], colour[[y, x, 1]], colour[[y, x, 2]]]);
+            sums[y / TILE * per_side + x / TILE] += f64::from(pixel) / (TILE * TILE) as f64;
+        }
+    }
+    sums
+}
+
+/// Mean and standard error of `values`.
+fn moments(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
+    let n = values.clone().count() as f64;
+    let mean = values.clone().sum::<f64>() / n;
+    let variance = values.map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    (mean, (variance / n).sqrt())
+}
+
+/// Tile means of the image by Mitsuba and the variances of these means.
+fn reference(name: &str) -> (Vec<f64>, Vec<f64>) {
+    let read = |file: String| Image::read(&root().join("tests/reference").join(file)).expect("a reference").colour;
+    let mean = tiles(&read(format!("{name}.exr")));
+    // Pixels of a box-filtered image are independent; channels are taken as fully correlated, which errs to the safe
+    // side: the variance of a luminance is then the squared luminance of the deviations.
+    let deviations = read(format!("{name}_var.exr")).mapv(f32::sqrt);
+    let squares = ndarray::Array3::from_shape_fn(deviations.dim(), |(y, x, _)| {
+        let d = luminance([deviations[[y, x, 0]], deviations[[y, x, 1]], deviations[[y, x, 2]]]);
+        d * d
+    });
+    let variance = tiles(&squares).into_iter().map(|v| v / (TILE * TILE) as f64).collect();
+    (mean, variance)
+}
+
+/// No correct program fails this more than once in 10⁴ runs: 160 comparisons by 9 standard errors of which most comes
+/// from 16 runs (Student's t with 15 degrees of freedom: 2·10⁻⁷ each). Half a percent is granted beside noise for half
+/// floats, Mitsuba's single precision and the noise that heavy tails hide from a variance.
+#[test]
+fn path_tracing_agrees_with_mitsuba_on_every_scene() {
+    for name in SCENES {
+        let scene = scene(name, [SIDE, SIDE]);
+        let runs: Vec<Vec<f64>> = (0..16).map(|seed| tiles(&image(&scene, Method::Path, seed, 24).colour)).collect();
+        let (expected, variance) = reference(name);
+        for tile in 0..expected.len() {
+            let (mean, error) = moments(runs.iter().map(|run| run[tile]));
+            let error = (error * error + variance[tile]).sqrt();
+            let difference = (mean - expected[tile]).abs();
+            assert!(
+                difference < 9.0 * error + 0.005 * expected[tile],
+                "{name}, tile {tile}: {mean}, Mitsuba {}: {:.1} standard errors",
+                expected[tile],
+                difference / error
+            );
+        }
+    }
+}
+
+fn layers(image: &Image) -> BTreeMap<String, f64> {
+    let mean = |layer: &ndarray::Array2<f32>| layer.iter().map(|v| f64::from(*v)).sum::<f64>() / layer.len() as f64;
+    let mut means = BTreeMap::new();
+    for (name, layer) in &image.layers {
+        if let Layer::Luminance(layer) = layer {
+            means.insert(name.clone(), mean(layer));
+        }
+    }
+    means.insert("all".to_owned(), means.values().sum());
+    means
+}
+
+#[test]
+fn classes_add_up_to_the_image() {
+    for method in METHODS {
+        let image = image(&scene("spheres", [32, 32]), method, 1, 2);
+        for ((y, x, c), _) in image.colour.indexed_iter().filter(|((_, _, c), _)| *c == 0) {
+            let colour = [c, 1, 2].map(|c| image.colour[[y, x, c]]);
+            let sum: f32 = image
+                .layers
+                .values()
+                .map(|layer| match layer {
+                    Layer::Luminance(layer) => layer[[y, x]],
+                    Layer::Colour(_) => 0.0,
+                })
+                .sum();
+            assert!((sum - luminance(colour)).abs() <= 1e-5 * sum.max(1e-3), "{method:?} at {x}, {y}");
+        }
+    }
+}
+
+#[test]
+fn the_number_of_threads_does_not_show() {
+    for name in ["spheres", "bokeh"] {
+        let scene = scene(name, [40, 24]);
+        for method in METHODS {
+            let on = |threads: usize| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+                let image = pool.install(|| image(&scene, method, 7, 3));
+                (image.colour, image.layers)
+            };
+            let one = on(1);
+            assert!(one == on(2) && one == on(5), "{method:?} on {name}");
+        }
+    }
+}
+
+/// All classes that carry a thousandth of the light, all scenes, all methods: prints the table that it checks. SPPM is
+/// granted the bias of its radius, a part of each class. Takes some ten minutes.
+#[test]
+#[ignore = "long: cargo test --release --test own_scenes -- --ignored --nocapture"]
+fn methods_agree_class_by_class_on_every_scene() {
+    const RUNS: u64 = 16;
+    let mut worst = Vec::new();
+    println!(
+        "| scene | method | classes | worst | z | bias beyond noise | mean ratio |\n|---|---|---|---|---|---|---|"
+    );
+    for name in SCENES {
+        let scene = scene(name, [48, 48]);
+        let runs = |method: Method, passes: u64| -> Vec<BTreeMap<String, f64>> {
+            (0..RUNS).map(|seed| layers(&image(&scene, method, seed, passes))).collect()
+        };
+        let classes = |runs: &[BTreeMap<String, f64>]| {
+            let class = |name: &str| moments(runs.iter().map(|run| run.get(name).copied().unwrap_or(0.0)));
+            let names: std::collections::BTreeSet<String> = runs.iter().flat_map(|run| run.keys().cloned()).collect();
+            names.into_iter().map(|name| (name.clone(), class(&name))).collect::<BTreeMap<String, (f64, f64)>>()
+        };
+        let bdpt = classes(&runs(Method::Bdpt, 160));
+        for (method, passes, granted) in
+            [(Method::Path, 1000, 0.0), (Method::Mmlt, 300, 0.0), (Method::Sppm, 200, 0.03)]
+        {
+            let other = classes(&runs(method, passes));
+            let mut top = (String::new(), 0.0, 0.0);
+            let mut count = 0;
+            for (class, (a, error_a)) in &bdpt {
+                let (b, error_b) = other.get(class).copied().unwrap_or((0.0, 0.0));
+                // What only a point light makes, no walk from the camera finds.
+                let blind = name == "bokeh" && method == Method::Path;
+                if *a < 1e-3 * bdpt["all"].0 || (blind && (class.contains("LS") || class == "all")) {
+                    continue;
+                }
+                count += 1;
+                let excess = ((a - b).abs() - granted * a).max(0.0);
+                let z = excess / error_a.hypot(error_b);
+                if z > top.1 {
+                    top = (class.clone(), z, (b - a) / a);
+                }
+            }
+            println!(
+                "| {name} | {} | {count} | {} | {:.1} | {:+.2} % | {:.4} |",
+                method.name(),
+                top.0,
+                top.1,
+                100.0 * top.2,
+                other["all"].0 / bdpt["all"].0
+            );
+            worst.push((name, method, top));
+        }
+    }
+    for (name, method, (class, z, _)) in worst {
+        assert!(z < 9.0, "{name}, {method:?}: class {class} is {z:.1} standard errors from bdpt");
+    }
+}
+
+/// The bias of photon mapping shrinks as its radius does.
+#[test]
+fn the_bias_of_photon_mapping_shrinks_with_passes() {
+    let scene = scene("ring", [SIDE, SIDE]);
+    let truth: Vec<f64> = {
+        let runs: Vec<Vec<f64>> = (100..108).map(|seed| tiles(&image(&scene, Method::Bdpt, seed, 24).colour)).collect();
+        (0..runs[0].len()).map(|tile| moments(runs.iter().map(|run| run[tile])).0).collect()
+    };
+    // Root mean squared deviation of the tile means of eight averaged runs: mostly bias.
+    let bias = |passes: u64| {
+        let runs: Vec<Vec<f64>> = (0..8).map(|seed| tiles(&image(&scene, Method::Sppm, seed, passes).colour)).collect();
+        let squares = (0..truth.len()).map(|tile| (moments(runs.iter().map(|run| run[tile])).0 - truth[tile]).powi(2));
+        (squares.sum::<f64>() / truth.len() as f64).sqrt()
+    };
+    let (few, many) = (bias(2), bias(64));
+    println!("deviation from bdpt: {few:.5} after 2 passes, {many:.5} after 64");
+    assert!(many < 0.6 * few, "{few} after 2 passes, {many} after 64");
+}
+
+#[test]
+fn every_scene_has_its_reference() {
+    for name in SCENES {
+        for file in [format!("scenes/{name}/scene.xml"), format!("tests/reference/{name}.exr")] {
+            assert!(PathBuf::from(root()).join(&file).is_file(), "{file}");
+        }
+    }
+}
