@@ -157,7 +157,7 @@ fn wrong_use_is_told_before_any_work() {
 fn bad_scenes_are_pointed_at() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    let sensor = "<sensor type='perspective'><film type='hdrfilm'/></sensor>";
+    let sensor = "<sensor type='perspective'><float name='fov' value='45'/><film type='hdrfilm'/></sensor>";
     let cases = [
         ("<scene version='3.0.0'>\n  <bsdf type='velvet' id='a'/></scene>", vec!["bad.xml:2:", "velvet", "expected"]),
         (
@@ -194,7 +194,7 @@ fn bad_scenes_are_pointed_at() {
 fn a_scene_without_light_is_black() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    let text = "<scene version='3.0.0'><sensor type='perspective'><film type='hdrfilm'>\
+    let text = "<scene version='3.0.0'><sensor type='perspective'><float name='fov' value='45'/><film type='hdrfilm'>\
         <integer name='width' value='8'/><integer name='height' value='8'/></film></sensor>\
         <shape type='sphere'/></scene>";
     fs::write(path.join("dark.xml"), text).unwrap();
@@ -215,7 +215,7 @@ fn a_scene_without_light_is_black() {
 fn a_camera_inside_a_wall_sees_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    let text = "<scene version='3.0.0'><sensor type='perspective'><film type='hdrfilm'>\
+    let text = "<scene version='3.0.0'><sensor type='perspective'><float name='fov' value='45'/><film type='hdrfilm'>\
         <integer name='width' value='8'/><integer name='height' value='8'/></film></sensor>\
         <shape type='sphere'><bsdf type='diffuse'/></shape>\
         <shape type='sphere'><point name='center' x='5' y='0' z='0'/><emitter type='area'>\

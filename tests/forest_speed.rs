@@ -13,7 +13,9 @@ use serde_json::json;
 
 fn rows(count: usize, features: u16, random: &mut Xoshiro256PlusPlus) -> Rows {
     let mut rows = Rows::new();
-    (0..features).for_each(|f| drop(rows.feature(&format!("path_{f}")).unwrap()));
+    for f in 0..features {
+        rows.feature(&format!("path_{f}")).unwrap();
+    }
     let mut entries = Vec::new();
     for i in 0..count {
         entries.clear();

@@ -40,6 +40,7 @@ fn conductor_channel(cos_i: f64, eta: f64, k: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::expect_used)]
     use super::*;
 
     #[test]

@@ -91,13 +91,13 @@ fn flip(w: DVec3) -> DVec3 {
 impl Bsdf {
     /// Value, densities and letter for a pair of directions; `None` where the value is zero, always so for delta lobes.
     #[inline]
-    pub fn evaluate(&self, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
+    pub fn evaluate(&self, wi: DVec3, wo: DVec3) -> Option<Evaluation> {
         match self {
             Self::Diffuse(diffuse) => diffuse.evaluate(wi, wo),
             Self::RoughConductor(rough) => rough.evaluate(wi, wo),
             Self::Conductor(_) | Self::Dielectric(_) => None,
-            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].evaluate(wi, wo, walk),
-            Self::TwoSided(sides) => sides[1].evaluate(flip(wi), flip(wo), walk),
+            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].evaluate(wi, wo),
+            Self::TwoSided(sides) => sides[1].evaluate(flip(wi), flip(wo)),
         }
     }
 

@@ -51,14 +51,14 @@ fn sampling_agrees_with_evaluation() {
             let wi = incident(&mut stream);
             let Some(scatter) = bsdf.sample(wi, stream.row(), Walk::FromLight) else { continue };
             assert!((scatter.direction.length() - 1.0).abs() < 1e-9, "{name}");
-            let evaluation = bsdf.evaluate(wi, scatter.direction, Walk::FromLight);
+            let evaluation = bsdf.evaluate(wi, scatter.direction);
             assert_eq!(evaluation.is_none(), scatter.delta, "{name}");
             let Some(evaluation) = evaluation else { continue };
             let weight = evaluation.value * (scatter.direction.z.abs() / evaluation.pdf.0);
             for (a, b) in weight.to_rgb().into_iter().zip(scatter.weight.to_rgb()) {
                 assert!((a - b).abs() < 1e-9 * b.max(1.0), "{name}: {a} {b}");
             }
-            let back = bsdf.evaluate(scatter.direction, wi, Walk::FromLight).expect("the way back exists");
+            let back = bsdf.evaluate(scatter.direction, wi).expect("the way back exists");
             assert!((back.pdf.0 - evaluation.pdf_reverse.0).abs() <= 1e-9 * back.pdf.0, "{name}");
             for (a, b) in back.value.to_rgb().into_iter().zip(evaluation.value.to_rgb()) {
                 assert!((a - b).abs() <= 1e-9 * b, "{name} is not reciprocal: {a} {b}");
@@ -97,7 +97,7 @@ fn sampled_and_uniform_albedo_agree_and_conserve_energy() {
                 let scatter = bsdf.sample(wi, stream.row(), Walk::FromLight);
                 sampled.push(scatter.filter(|s| !s.delta).map_or(0.0, |s| s.weight.luminance()));
                 let wo = warp::sphere::sample([stream.number(), stream.number()]);
-                let value = bsdf.evaluate(wi, wo, Walk::FromLight).map_or(0.0, |e| e.value.luminance());
+                let value = bsdf.evaluate(wi, wo).map_or(0.0, |e| e.value.luminance());
                 uniform.push(value * wo.z.abs() / warp::sphere::PDF.0);
             }
             let error = (sampled.variance_of_mean() + uniform.variance_of_mean()).sqrt();

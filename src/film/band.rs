@@ -39,10 +39,10 @@ impl Band {
         self.add_at((y - self.first_row) * self.width + x, class, value);
     }
 
-    pub(super) fn splat(&mut self, splat: &Splat, scale: f64) {
+    pub(super) fn splat(&mut self, splat: &Splat) {
         let [r, g, b] = splat.value.map(f64::from);
         let index = splat.pixel as usize - self.first_row * self.width;
-        self.add_at(index, splat.class, Spectrum::rgb(r, g, b) * scale);
+        self.add_at(index, splat.class, Spectrum::rgb(r, g, b));
     }
 
     #[inline]

@@ -73,12 +73,12 @@ impl Film {
         self.bands.par_iter_mut().enumerate().map(|(index, band)| job(index, band)).collect()
     }
 
-    /// Adds the splats of some jobs, in the order of the jobs, times `scale`.
-    pub fn splat(&mut self, jobs: &[Splats], scale: f64) {
+    /// Adds the splats of some jobs, in the order of the jobs.
+    pub fn splat(&mut self, jobs: &[Splats]) {
         self.bands.par_iter_mut().enumerate().for_each(|(index, band)| {
             for splats in jobs {
                 for splat in splats.band(index) {
-                    band.splat(splat, scale);
+                    band.splat(splat);
                 }
             }
         });

@@ -53,7 +53,7 @@ impl Bdpt {
         });
         counts.add((size[0] * size[1]) as u64, jobs.iter().map(|job| job.1).sum());
         let splats: Vec<Splats> = jobs.into_iter().map(|job| job.0).collect();
-        film.splat(&splats, 1.0);
+        film.splat(&splats);
     }
 }
 

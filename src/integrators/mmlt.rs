@@ -57,9 +57,16 @@ struct Chain {
     state: ChainState,
     stream: Stream,
     current: Contribution,
-    large: Acceptance,
-    small: Acceptance,
-    technique_change: Acceptance,
+    /// Of large steps, small steps, and small steps that change the technique.
+    tallies: [Acceptance; 3],
+}
+
+/// What a lane made in one pass.
+struct Job {
+    splats: Splats,
+    rays: u64,
+    /// Per length the sum of the luminances that large steps found, and their number.
+    large_steps: Vec<(f64, u64)>,
 }
 
 /// One chain of each length that light takes.
@@ -111,8 +118,7 @@ impl Mmlt {
                 let current = lane.evaluate(&caster, edges, &mut state, &mut draws);
                 state.accept();
                 let Some(current) = current else { continue };
-                let tally = Acceptance { length: edges, ..Acceptance::default() };
-                lane.chains.push(Chain { state, stream, current, large: tally, small: tally, technique_change: tally });
+                lane.chains.push(Chain { state, stream, current, tallies: Default::default() });
             }
             this.lengths.push(Length { edges, sum: luminances.iter().sum(), samples: per_length as u64 });
         }
@@ -134,47 +140,41 @@ impl Mmlt {
                 (length.edges, mutations as u64, b * pixels / (mutations * LANES as f64))
             })
             .collect();
-        let jobs: Vec<(Splats, u64, Vec<(f64, u64)>)> = self
+        let jobs: Vec<Job> = self
             .lanes
             .par_iter_mut()
             .map(|lane| {
                 let caster = Caster::new(scene);
                 let mut splats = Splats::new(size);
-                let found = lane.run(&caster, &kernel, &plan, &mut splats);
-                (splats, caster.rays(), found)
+                let large_steps = lane.run(&caster, &kernel, &plan, &mut splats);
+                Job { splats, rays: caster.rays(), large_steps }
             })
             .collect();
-        for (_, _, found) in &jobs {
-            for (length, (sum, samples)) in self.lengths.iter_mut().zip(found) {
+        for job in &jobs {
+            for (length, (sum, samples)) in self.lengths.iter_mut().zip(&job.large_steps) {
                 length.sum += sum;
                 length.samples += samples;
             }
         }
         let mutations: u64 = plan.iter().map(|(_, mutations, _)| mutations * LANES as u64).sum();
-        counts.add(mutations, jobs.iter().map(|job| job.1).sum());
-        let splats: Vec<Splats> = jobs.into_iter().map(|job| job.0).collect();
-        film.splat(&splats, 1.0);
+        counts.add(mutations, jobs.iter().map(|job| job.rays).sum());
+        let splats: Vec<Splats> = jobs.into_iter().map(|job| job.splats).collect();
+        film.splat(&splats);
         self.report(counts);
     }
 
     /// Acceptance so far, summed over the lanes.
     fn report(&self, counts: &mut Counts) {
-        let kinds: [(&'static str, fn(&Chain) -> &Acceptance); 3] = [
-            ("large_step", |chain| &chain.large),
-            ("small_step", |chain| &chain.small),
-            ("technique_change", |chain| &chain.technique_change),
-        ];
-        for (name, of) in kinds {
-            let sums = (0..self.lengths.len()).map(|index| {
-                self.lanes.iter().map(|lane| of(&lane.chains[index])).fold(Acceptance::default(), |sum, one| {
-                    Acceptance {
-                        length: one.length,
-                        proposed: sum.proposed + one.proposed,
-                        accepted: sum.accepted + one.accepted,
-                    }
+        for (kind, name) in ["large_step", "small_step", "technique_change"].into_iter().enumerate() {
+            let sum = |(index, length): (usize, &Length)| {
+                let tallies = self.lanes.iter().map(|lane| lane.chains[index].tallies[kind]);
+                tallies.fold(Acceptance { length: length.edges, ..Acceptance::default() }, |sum, one| Acceptance {
+                    proposed: sum.proposed + one.proposed,
+                    accepted: sum.accepted + one.accepted,
+                    ..sum
                 })
-            });
-            counts.acceptance.insert(name, sums.collect());
+            };
+            counts.acceptance.insert(name, self.lengths.iter().enumerate().map(sum).collect());
         }
     }
 }
@@ -296,11 +296,11 @@ impl Lane {
             kind.proposed += 1;
             kind.accepted += u64::from(accepted);
         };
-        tally(if large { &mut chain.large } else { &mut chain.small });
+        tally(&mut chain.tallies[usize::from(!large)]);
         if let Some(found) = &proposal {
             splat(found, acceptance);
             if !large && found.technique != chain.current.technique {
-                tally(&mut chain.technique_change);
+                tally(&mut chain.tallies[2]);
             }
         }
         match proposal.filter(|_| accepted) {

@@ -168,7 +168,7 @@ pub(super) fn direct(
 ) {
     let Some(light) = sample_direct(scene, surface.position, stream.row()) else { return };
     let wo = surface.frame.to_local(light.direction);
-    let Some(scattered) = scene.bsdf(surface.bsdf).evaluate(wi, wo, Walk::FromCamera) else { return };
+    let Some(scattered) = scene.bsdf(surface.bsdf).evaluate(wi, wo) else { return };
     if !light.arrives(scene, surface.leave(light.direction)) {
         return;
     }

@@ -192,7 +192,7 @@ impl Sppm {
                 return;
             }
             let wo = surface.frame.to_local(photon.back);
-            let Some(scattered) = bsdf.evaluate(wi, wo, Walk::FromCamera) else { return };
+            let Some(scattered) = bsdf.evaluate(wi, wo) else { return };
             // Photons arrive per true area, scattering counts area seen along the shading normal.
             let geometric = photon.back.dot(surface.geometric).abs();
             let correction = if geometric > 0.0 { wo.z.abs() / geometric } else { 0.0 };

@@ -72,7 +72,8 @@ pub(super) fn weight(light: &[Vertex], camera: &[Vertex], junction: &Junction, h
             _ => camera[i].reverse.0,
         };
         ratio *= from_light / camera[i].forward.0;
-        if !(camera[i].delta && scatters(i)) && !camera[i - 1].delta {
+        let blocked = (camera[i].delta && scatters(i)) || camera[i - 1].delta;
+        if !blocked {
             sum += heuristic.apply(ratio);
         }
     }
