@@ -13,7 +13,9 @@ use serde_json::json;
 
 fn rows(count: usize, features: u16, random: &mut Xoshiro256PlusPlus) -> Rows {
     let mut rows = Rows::new();
-    (0..features).for_each(|f| drop(rows.feature(&format!("path_{f}")).unwrap()));
+    for f in 0..features {
+        rows.feature(&format!("path_{f}")).unwrap();
+    }
     let mut entries = Vec::new();
     for i in 0..count {
         entries.clear();
@@ -75,6 +77,11 @@ fn blending_a_720p_pair() {
     let (a, b) = (Input::new("a", &a), Input::new("b", &b));
     let threads = rayon::current_num_threads();
     let weights = best_of(10, || drop(weight_map(&model, a, b).unwrap()));
+    let start = cpu_time::ProcessTime::now();
+    weight_map(&model, a, b).unwrap();
+    let cpu = start.elapsed();
     let whole = best_of(10, || drop(apply(&model, a, b).unwrap()));
-    println!("1280×720, 60 classes, {threads} threads: weights {weights:?}, blend with all layers {whole:?}");
+    println!(
+        "1280×720, 60 classes, {threads} threads: weights {weights:?} ({cpu:?} of processor time), blend with all layers {whole:?}"
+    );
 }
