@@ -65,9 +65,17 @@ fn edited(edit: impl FnOnce(&mut Value)) -> Result<Model, ForestError> {
     Model::from_json(&value.to_string(), Path::new("models/m"))
 }
 
+/// A tree that is one long branch.
+fn chain(splits: usize) -> Value {
+    let mut feature = vec![0; splits];
+    feature.resize(2 * splits + 1, -1);
+    json!({"feature": feature, "value": vec![0.5; 2 * splits + 1]})
+}
+
 #[test]
 fn each_kind_of_damage_is_named() {
     assert!(edited(|_| ()).is_ok());
+    assert!(edited(|v| v["trees"][0] = chain(64)).is_ok());
     let error = edited(|v| v["version"] = json!(2)).unwrap_err();
     assert!(matches!(error, ForestError::Version { found: 2, expected: 1, .. }));
     let cases: Vec<(&str, Result<Model, ForestError>)> = vec![
@@ -82,6 +90,7 @@ fn each_kind_of_damage_is_named() {
         ("as many of one", edited(|v| drop(v["trees"][0]["value"].as_array_mut().unwrap().pop()))),
         ("leaf of value 1.5", edited(|v| v["trees"][0] = json!({"feature": [-1], "value": [1.5]}))),
         ("threshold inf", edited(|v| v["trees"][0] = json!({"feature": [0, -1, -1], "value": [1e300, 0.5, 0.5]}))),
+        ("65 splits on the way", edited(|v| v["trees"][0] = chain(65))),
         ("no trees", edited(|v| v["trees"] = json!([]))),
         ("twice", edited(|v| v["features"][1] = v["features"][0].clone())),
         ("invalid length 1", edited(|v| v["integrators"] = json!(["mmlt"]))),

@@ -77,6 +77,11 @@ fn blending_a_720p_pair() {
     let (a, b) = (Input::new("a", &a), Input::new("b", &b));
     let threads = rayon::current_num_threads();
     let weights = best_of(10, || drop(weight_map(&model, a, b).unwrap()));
+    let start = cpu_time::ProcessTime::now();
+    weight_map(&model, a, b).unwrap();
+    let cpu = start.elapsed();
     let whole = best_of(10, || drop(apply(&model, a, b).unwrap()));
-    println!("1280×720, 60 classes, {threads} threads: weights {weights:?}, blend with all layers {whole:?}");
+    println!(
+        "1280×720, 60 classes, {threads} threads: weights {weights:?} ({cpu:?} of processor time), blend with all layers {whole:?}"
+    );
 }

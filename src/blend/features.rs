@@ -6,8 +6,13 @@ use serde::{Deserialize, Serialize};
 
 use super::planes::Planes;
 
-/// Pixels whose features are computed together: their planes stay in the nearest caches.
-pub(super) const TILE: usize = 128;
+/// Pixels whose features are computed together: few enough for all channels to stay in the cache, enough for each plane to
+/// be read in runs of a page.
+pub(super) const TILE: usize = 1024;
+
+/// Distance between a tile's channels. A power of two would put the same pixel of all channels into the same few lines of
+/// the cache.
+pub(super) const STRIDE: usize = TILE + 16;
 
 /// Which features describe a pixel. The choice is stored in the model, and blending follows it.
 ///
@@ -64,12 +69,14 @@ pub(super) struct Features<'a> {
     planes: &'a Planes<'a>,
     channels: Vec<Channel>,
     names: Vec<String>,
+    /// For each class the channels that its plane in image a, and that in image b, go into.
+    outputs: Vec<[Option<usize>; 2]>,
 }
 
 /// Features of up to [`TILE`] neighbouring pixels.
 #[derive(Debug)]
 pub(super) struct Tile {
-    /// Channel c of pixel i stands at `values[c * TILE + i]`.
+    /// Channel c of pixel i stands at `values[c * STRIDE + i]`.
     pub values: Vec<f32>,
     /// Summed class luminance of each pixel in images a and b.
     a: [f32; TILE],
@@ -89,8 +96,17 @@ impl<'a> Features<'a> {
     pub(super) fn new(set: FeatureSet, planes: &'a Planes<'a>, wanted: Option<&[&str]>) -> Self {
         let channels = set.channels(planes.classes.len()).into_iter().map(|c| (c, c.name(planes)));
         let is_wanted = |name: &str| wanted.is_none_or(|w| w.contains(&name));
-        let (channels, names) = channels.filter(|(_, name)| is_wanted(name)).unzip();
-        Self { planes, channels, names }
+        let (channels, names): (Vec<Channel>, _) = channels.filter(|(_, name)| is_wanted(name)).unzip();
+        let mut outputs = vec![[None; 2]; planes.classes.len()];
+        for (c, &channel) in channels.iter().enumerate() {
+            match channel {
+                Channel::Mean(k) => outputs[k] = [Some(c); 2],
+                Channel::A(k) => outputs[k][0] = Some(c),
+                Channel::B(k) => outputs[k][1] = Some(c),
+                Channel::Difference => {}
+            }
+        }
+        Self { planes, channels, names, outputs }
     }
 
     /// Names of the channels, in order.
@@ -100,54 +116,57 @@ impl<'a> Features<'a> {
 
     /// Memory for one tile.
     pub(super) fn tile(&self) -> Tile {
-        Tile { values: vec![0.0; self.channels.len() * TILE], a: [0.0; TILE], b: [0.0; TILE] }
+        Tile { values: vec![0.0; self.channels.len() * STRIDE], a: [0.0; TILE], b: [0.0; TILE] }
     }
 
     /// Computes the features of the pixels in `range`, at most [`TILE`] of them.
+    ///
+    /// Each plane is read once, for the sums and for its channel together: reading is most of the work.
     pub(super) fn fill(&self, range: Range<usize>, tile: &mut Tile) {
         let count = range.len();
         tile.a = [0.0; TILE];
         tile.b = [0.0; TILE];
-        for class in &self.planes.classes {
-            for (plane, sums) in [(&class.a, &mut tile.a), (&class.b, &mut tile.b)] {
-                if let Some(plane) = plane {
-                    sums.iter_mut().zip(&plane[range.clone()]).for_each(|(sum, &v)| *sum += light(v));
-                }
-            }
+        for (class, &[to_a, to_b]) in self.planes.classes.iter().zip(&self.outputs) {
+            let mut put = |plane: Option<&[f32]>, sums: &mut [f32; TILE], to: Option<usize>, start_afresh: bool| {
+                let out = to.map(|c| &mut tile.values[c * STRIDE..c * STRIDE + count]);
+                gather(plane.map(|p| &p[range.clone()]), &mut sums[..count], out, start_afresh);
+            };
+            put(class.a.as_deref(), &mut tile.a, to_a, true);
+            put(class.b.as_deref(), &mut tile.b, to_b, to_a != to_b);
         }
         let both: [f32; TILE] = std::array::from_fn(|i| reciprocal(tile.a[i] + tile.b[i]));
         let (only_a, only_b) = (tile.a.map(reciprocal), tile.b.map(reciprocal));
-        for (&channel, out) in self.channels.iter().zip(tile.values.chunks_exact_mut(TILE)) {
+        for (&channel, out) in self.channels.iter().zip(tile.values.chunks_exact_mut(STRIDE)) {
             let out = &mut out[..count];
             match channel {
-                Channel::Mean(k) => {
-                    let class = &self.planes.classes[k];
-                    out.fill(0.0);
-                    add(out, class.a.as_deref(), &range);
-                    add(out, class.b.as_deref(), &range);
-                    scale(out, &both);
-                }
-                Channel::A(k) => {
-                    out.fill(0.0);
-                    add(out, self.planes.classes[k].a.as_deref(), &range);
-                    scale(out, &only_a);
-                }
-                Channel::B(k) => {
-                    out.fill(0.0);
-                    add(out, self.planes.classes[k].b.as_deref(), &range);
-                    scale(out, &only_b);
-                }
-                Channel::Difference => {
-                    (0..count).for_each(|i| out[i] = (tile.a[i] - tile.b[i]) * both[i]);
-                }
+                Channel::Mean(_) => scale(out, &both),
+                Channel::A(_) => scale(out, &only_a),
+                Channel::B(_) => scale(out, &only_b),
+                Channel::Difference => (0..count).for_each(|i| out[i] = (tile.a[i] - tile.b[i]) * both[i]),
             }
         }
     }
 }
 
-fn add(out: &mut [f32], plane: Option<&[f32]>, range: &Range<usize>) {
-    if let Some(plane) = plane {
-        out.iter_mut().zip(&plane[range.clone()]).for_each(|(out, &v)| *out += light(v));
+/// Adds the light of a plane to `sums`, and to `out` (or puts it there, to `start_afresh`).
+fn gather(plane: Option<&[f32]>, sums: &mut [f32], out: Option<&mut [f32]>, start_afresh: bool) {
+    match (plane, out) {
+        (None, Some(out)) if start_afresh => out.fill(0.0),
+        (None, _) => {}
+        (Some(plane), None) => sums.iter_mut().zip(plane).for_each(|(sum, &v)| *sum += light(v)),
+        (Some(plane), Some(out)) if start_afresh => {
+            for ((sum, out), &v) in sums.iter_mut().zip(out).zip(plane) {
+                *out = light(v);
+                *sum += *out;
+            }
+        }
+        (Some(plane), Some(out)) => {
+            for ((sum, out), &v) in sums.iter_mut().zip(out).zip(plane) {
+                let light = light(v);
+                *out += light;
+                *sum += light;
+            }
+        }
     }
 }
 
@@ -159,7 +178,7 @@ fn scale(out: &mut [f32], by: &[f32; TILE]) {
 #[inline]
 fn light(v: f32) -> f32 {
     // The upper bound keeps sums of all classes finite.
-    if v > 0.0 && v < 1e30 { v } else { 0.0 }
+    if (v > 0.0) & (v < 1e30) { v } else { 0.0 }
 }
 
 #[inline]

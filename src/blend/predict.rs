@@ -5,15 +5,12 @@ use std::borrow::Cow;
 use rayon::prelude::*;
 
 use super::BlendError;
-use super::features::{FeatureSet, Features, TILE, Tile};
+use super::features::{FeatureSet, Features, STRIDE, TILE, Tile};
 use super::planes::Planes;
 use crate::forest::{Forest, Lanes, Linear, Model};
 
 /// The weight of a pixel of which nothing is known (thesis, section 5.5).
 pub(super) const UNKNOWN: f32 = 0.5;
-
-/// Tiles per parallel task: enough work to pay for handing it out.
-const TILES_PER_TASK: usize = 8;
 
 /// The features that a model was trained on.
 pub(super) fn feature_set(model: &Model) -> Result<FeatureSet, BlendError> {
@@ -25,7 +22,7 @@ pub(super) fn feature_set(model: &Model) -> Result<FeatureSet, BlendError> {
 pub(super) fn forest_weights(forest: &Forest, set: FeatureSet, planes: &Planes<'_>) -> Vec<f32> {
     let used: Vec<&str> = forest.used_features().iter().map(|&f| forest.features()[usize::from(f)].as_str()).collect();
     let features = Features::new(set, planes, Some(&used));
-    let lanes = Lanes::new(forest, &positions(forest.features(), &features), TILE);
+    let lanes = Lanes::new(forest, &positions(forest.features(), &features), STRIDE);
     weights(&features, planes.pixels, |tile, out| lanes.predict(&tile.values, out))
 }
 
@@ -35,7 +32,7 @@ pub(super) fn linear_weights(linear: &Linear, set: FeatureSet, planes: &Planes<'
     let positions = positions(linear.features(), &features);
     weights(&features, planes.pixels, |tile, out| {
         for (i, out) in out.iter_mut().enumerate() {
-            let value = |f: u16| positions[usize::from(f)].map_or(0.0, |p| tile.values[p * TILE + i]);
+            let value = |f: u16| positions[usize::from(f)].map_or(0.0, |p| tile.values[p * STRIDE + i]);
             *out = linear.predict_with(value);
         }
     })
@@ -48,27 +45,22 @@ fn positions(wanted: &[String], features: &Features<'_>) -> Vec<Option<usize>> {
 
 fn weights(features: &Features<'_>, pixels: usize, predict: impl Fn(&Tile, &mut [f32]) + Sync) -> Vec<f32> {
     let mut weights = vec![UNKNOWN; pixels];
-    let tasks = weights.par_chunks_mut(TILES_PER_TASK * TILE).enumerate();
-    tasks.for_each_init(
+    weights.par_chunks_mut(TILE).enumerate().for_each_init(
         || features.tile(),
         |tile, (task, out)| {
-            for (t, out) in out.chunks_mut(TILE).enumerate() {
-                let start = (task * TILES_PER_TASK + t) * TILE;
-                features.fill(start..start + out.len(), tile);
-                predict(tile, out);
-                out.iter_mut().enumerate().filter(|(i, _)| !tile.known(*i)).for_each(|(_, w)| *w = UNKNOWN);
-            }
+            features.fill(task * TILE..task * TILE + out.len(), tile);
+            predict(tile, out);
+            out.iter_mut().enumerate().filter(|(i, _)| !tile.known(*i)).for_each(|(_, w)| *w = UNKNOWN);
         },
     );
     weights
 }
 
-/// Colours of both images, their pixel count and weights of a: the blend, three numbers per pixel.
+/// The blend of two images' colours by the weights of a, three numbers per pixel.
 pub(super) fn mix_colours(weights: &[f32], a: &[f32], b: &[f32]) -> Vec<f32> {
     let mut out = vec![0.0f32; a.len()];
-    let chunk = TILES_PER_TASK * TILE;
-    out.par_chunks_mut(3 * chunk).enumerate().for_each(|(task, out)| {
-        let first = task * chunk;
+    out.par_chunks_mut(3 * TILE).enumerate().for_each(|(task, out)| {
+        let first = task * TILE;
         let weights = &weights[first..first + out.len() / 3];
         let (a, b) = (&a[3 * first..], &b[3 * first..]);
         for (i, &w) in weights.iter().enumerate() {

@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
 
-use super::features::{FeatureSet, Features, TILE};
+use super::features::{FeatureSet, Features, STRIDE, TILE};
 use super::planes::{Planes, colours, same_size};
 use super::weights::{Quotient, quotient};
 use super::{BlendError, Input};
@@ -87,7 +87,7 @@ pub fn append(
             let i = pixel - start;
             if tile.known(i) {
                 entries.clear();
-                entries.extend(columns.iter().enumerate().map(|(c, &column)| (column, tile.values[c * TILE + i])));
+                entries.extend(columns.iter().enumerate().map(|(c, &column)| (column, tile.values[c * STRIDE + i])));
                 entries.retain(|e| e.1 != 0.0);
                 rows.push(&entries, quotient.weight, (quotient.stake.min(cap) * scale) as f32, group)?;
                 appended += 1;

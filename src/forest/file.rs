@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use super::rows::MAX_FEATURES;
-use super::tree::{Forest, LEAF, Node, Tree};
+use super::tree::{Forest, LEAF, MAX_DEPTH, Node, Tree};
 use super::{ForestError, Rows};
 
 /// What the `format` field of every model file says.
@@ -216,10 +216,17 @@ impl TreeDocument {
             } else if i + 1 < n {
                 return Err((format!("the tree is complete after {} nodes", i + 1), format!("{n} nodes")));
             } else {
-                return Ok(Tree { nodes });
+                return shallow(Tree { nodes });
             }
         }
         Err((format!("the tree ends after {n} nodes with {} children missing", open.len() + 1), "a whole tree".into()))
+    }
+}
+
+fn shallow(tree: Tree) -> Result<Tree, (String, String)> {
+    match tree.depth() {
+        0..=MAX_DEPTH => Ok(tree),
+        depth => Err((format!("{depth} splits on the way to a leaf"), format!("at most {MAX_DEPTH}"))),
     }
 }
 

@@ -1,20 +1,23 @@
 //! The fast path for images: several points walk down a tree side by side.
 //!
-//! One point's way down is a chain of loads that wait for each other; eight at once keep the processor busy. Leaves lead
-//! to themselves, so that the lanes need not agree on where they end.
+//! One point's way down is a chain of loads that wait for each other; many at once keep the processor busy. Leaves lead to
+//! themselves, so that all points take the same number of steps and nothing needs to be decided on the way.
+
+use wide::f32x8;
 
 use super::tree::{Forest, LEAF, Tree};
 
-/// Points that walk together.
-const LANES: usize = 8;
+/// Points that walk together; a multiple of 8.
+const LANES: usize = 32;
 
-/// A node with both children spelt out.
+/// A node, as it is walked: to the next node if the feature's value is below `threshold`, else to `above`.
 #[derive(Debug, Clone, Copy)]
 struct Step {
     /// Start of the feature's plane.
     plane: u32,
     threshold: f32,
-    children: [u32; 2],
+    /// Distance from the next node to `above`.
+    skip: u32,
 }
 
 /// A forest made ready for points whose features lie in planes.
@@ -32,13 +35,15 @@ impl<'a> Lanes<'a> {
         Self { forest, trees, depths: forest.trees().iter().map(Tree::depth).collect() }
     }
 
-    /// Predictions in [0, 1] for points 0 .. `out.len()`; feature p of point i is `values[p * stride + i]`.
+    /// Predictions in [0, 1] for points 0 .. `out.len()` ≤ stride; the feature in plane p of point i is
+    /// `values[p * stride + i]`.
     pub(crate) fn predict(&self, values: &[f32], out: &mut [f32]) {
         out.fill(0.0);
         for ((steps, tree), &depth) in self.trees.iter().zip(self.forest.trees()).zip(&self.depths) {
             for (group, out) in out.chunks_mut(LANES).enumerate() {
-                let leaves = walk(steps, depth, values, group * LANES, out.len());
-                out.iter_mut().zip(leaves).for_each(|(out, leaf)| *out += tree.nodes[leaf as usize].value);
+                let leaves = walk(steps, depth, values.get(group * LANES..).unwrap_or_default());
+                let leaves = leaves.as_flattened();
+                out.iter_mut().zip(leaves).for_each(|(out, &leaf)| *out += tree.nodes[leaf as usize].value);
             }
         }
         let count = self.trees.len() as f32;
@@ -46,41 +51,37 @@ impl<'a> Lanes<'a> {
     }
 }
 
-/// Leaves that the points `first` .. `first + count` fall into.
+/// Leaves that the points whose features begin `values`, plane by plane, fall into.
 #[inline]
-fn walk(steps: &[Step], depth: usize, values: &[f32], first: usize, count: usize) -> [u32; LANES] {
-    let mut at = [0u32; LANES];
-    // Lanes beyond the last point follow it, which costs nothing and needs no second loop.
-    let points: [usize; LANES] = std::array::from_fn(|lane| first + lane.min(count - 1));
+fn walk(steps: &[Step], depth: usize, values: &[f32]) -> [[u32; 8]; LANES / 8] {
+    let mut at = [[0u32; 8]; LANES / 8];
+    // Always as many steps as the deepest leaf needs: asking at each whether all have arrived costs more.
     for _ in 0..depth {
-        let mut moved = false;
-        for lane in 0..LANES {
-            let step = steps[at[lane] as usize];
-            let value = values.get(step.plane as usize + points[lane]).copied().unwrap_or(0.0);
-            let next = step.children[usize::from(value >= step.threshold)];
-            moved |= next != at[lane];
-            at[lane] = next;
-        }
-        if !moved {
-            break;
+        for (group, at) in at.iter_mut().enumerate() {
+            let here = at.map(|at| steps[at as usize]);
+            let value = |lane: usize| values.get(here[lane].plane as usize + 8 * group + lane).copied().unwrap_or(0.0);
+            let value: [f32; 8] = std::array::from_fn(value);
+            // As vectors, because the compiler makes a jump of a scalar comparison, and which way it goes cannot be foreseen.
+            let below = f32x8::new(value).simd_lt(f32x8::new(here.map(|s| s.threshold)));
+            let skip = (!below & f32x8::new(here.map(|s| f32::from_bits(s.skip)))).to_array();
+            *at = std::array::from_fn(|lane| (at[lane] + 1).wrapping_add(skip[lane].to_bits()));
         }
     }
     at
 }
 
 fn steps(tree: &Tree, planes: &[Option<usize>], stride: usize) -> Vec<Step> {
+    // Leads to one place whatever the value is.
+    let always = |here: u32, to: u32| Step { plane: 0, threshold: f32::NEG_INFINITY, skip: to.wrapping_sub(here + 1) };
     let step = |(i, node): (usize, &super::Node)| {
         let here = i as u32;
         if node.feature == LEAF {
-            return Step { plane: 0, threshold: 0.0, children: [here; 2] };
+            return always(here, here);
         }
-        let children = [here + 1, node.above];
         match planes[usize::from(node.feature)] {
-            Some(plane) => Step { plane: (plane * stride) as u32, threshold: node.value, children },
-            None => {
-                let child = children[usize::from(0.0 >= node.value)];
-                Step { plane: 0, threshold: 0.0, children: [child; 2] }
-            }
+            Some(plane) => Step { plane: (plane * stride) as u32, threshold: node.value, skip: node.above - here - 1 },
+            None if node.value <= 0.0 => always(here, node.above),
+            None => always(here, here + 1),
         }
     };
     tree.nodes.iter().enumerate().map(step).collect()

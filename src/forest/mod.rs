@@ -23,4 +23,4 @@ pub use linear::Linear;
 pub use quality::Quality;
 pub use rows::{MAX_FEATURES, Rows, SplitBy};
 pub use train::{Settings, train};
-pub use tree::{Forest, LEAF, Node, Tree};
+pub use tree::{Forest, LEAF, MAX_DEPTH, Node, Tree};

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::binned::Binned;
 use super::grow::{Sample, grow};
 use super::refine::refine;
-use super::{Forest, ForestError, LEAF, Rows, SplitBy, Tree};
+use super::{Forest, ForestError, LEAF, MAX_DEPTH, Rows, SplitBy, Tree};
 
 /// How a forest is grown. The defaults are the thesis's where it gives any (section 5.5): 5 trees, depth 15, 100 KB.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -16,7 +16,7 @@ use super::{Forest, ForestError, LEAF, Rows, SplitBy, Tree};
 pub struct Settings {
     /// Number of trees, 1 to 1000.
     pub trees: usize,
-    /// Most splits between root and leaf, up to 64.
+    /// Most splits between root and leaf, up to [`MAX_DEPTH`] = 64.
     pub max_depth: usize,
     /// Most leaves per tree, 1 to 1 000 000. A leaf and its split take about 20 bytes in the file: 5 trees of 700 leaves stay
     /// below 100 KB.
@@ -61,7 +61,7 @@ impl Settings {
         if !(1..=1000).contains(&self.trees) {
             return wrong("trees", self.trees.to_string(), "1 to 1000");
         }
-        if self.max_depth > 64 {
+        if self.max_depth > MAX_DEPTH {
             return wrong("max_depth", self.max_depth.to_string(), "0 to 64");
         }
         if !(1..=1_000_000).contains(&self.max_leaves) {

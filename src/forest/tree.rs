@@ -4,6 +4,9 @@ use rayon::prelude::*;
 
 use super::Rows;
 
+/// Most splits between a tree's root and any leaf, grown or loaded.
+pub const MAX_DEPTH: usize = 64;
+
 /// `Node::feature` of a leaf.
 pub const LEAF: u16 = u16::MAX;
 
@@ -38,7 +41,7 @@ impl Tree {
         self.nodes.iter().filter(|n| n.feature == LEAF).count()
     }
 
-    /// Number of splits on the longest way down; 0 for a lone leaf.
+    /// Number of splits on the longest way down, at most [`MAX_DEPTH`]; 0 for a lone leaf.
     pub fn depth(&self) -> usize {
         let mut depths = vec![0usize; self.nodes.len()];
         for (i, node) in self.nodes.iter().enumerate().filter(|(_, n)| n.feature != LEAF) {
@@ -57,7 +60,7 @@ impl Tree {
             if node.feature == LEAF {
                 return i;
             }
-            i = if value(node.feature) >= node.value { node.above as usize } else { i + 1 };
+            i = if value(node.feature) < node.value { i + 1 } else { node.above as usize };
         }
     }
 }
