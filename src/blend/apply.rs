@@ -8,7 +8,7 @@ use super::planes::{Class, Planes};
 use super::predict::{UNKNOWN, feature_set, forest_weights, mix, mix_colours, mix_planes};
 use super::{BlendError, Input};
 use crate::forest::Model;
-use crate::image::{INTEGRATOR_KEY, Image, Layer, SCENE_KEY};
+use crate::image::{DEPTH_KEY, INTEGRATOR_KEY, Image, Layer, SCENE_KEY};
 
 /// The weight of image a at every pixel, height × width, in [0, 1]: the forest's prediction; 0.5 where a pixel has no
 /// light in any class of either image; all weight on the other image where one's colour is not finite.
@@ -136,15 +136,20 @@ fn in_order<'a>(model: &Model, a: Input<'a>, b: Input<'a>) -> Result<(Input<'a>,
 }
 
 fn same_scene(a: Input<'_>, b: Input<'_>) -> Result<(), BlendError> {
-    match (text(&a.image.manifest, SCENE_KEY), text(&b.image.manifest, SCENE_KEY)) {
-        (Some(x), Some(y)) if x != y => Err(BlendError::Content {
-            name: b.name.to_owned(),
-            what: "scene hash",
-            found: y.to_owned(),
-            expected: format!("`{x}` as in {}", a.name),
-        }),
-        _ => Ok(()),
+    for (key, what) in [(SCENE_KEY, "scene hash"), (DEPTH_KEY, "longest path")] {
+        match (a.image.manifest.get(key), b.image.manifest.get(key)) {
+            (Some(x), Some(y)) if x != y => {
+                return Err(BlendError::Content {
+                    name: b.name.to_owned(),
+                    what,
+                    found: y.to_string().trim_matches('"').to_owned(),
+                    expected: format!("`{}` as in {}", x.to_string().trim_matches('"'), a.name),
+                });
+            }
+            _ => {}
+        }
     }
+    Ok(())
 }
 
 fn text<'m>(manifest: &'m Map<String, Value>, key: &str) -> Option<&'m str> {

@@ -2,7 +2,8 @@
 //! leave-one-scene-out (thesis, section 5.5).
 //!
 //! Every image of a campaign is cached by the fingerprint of all that decides it, so that an interrupted campaign goes on
-//! where it stopped and recipes share what they have in common.
+//! where it stopped and recipes share what they have in common. What a method does in a given time is decided by the
+//! program too, so its fingerprint is part of theirs; references are the same by any sound program.
 
 use super::{BlendError, Objective, Options, Pair, Table, leave_one_out, train};
 use crate::forest::Model;
@@ -14,7 +15,11 @@ use ndarray::Zip;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::time::Duration;
+
+/// Longest time, in seconds.
+const LONGEST: f64 = 1e7;
 
 /// Seeds of the two halves of a reference; no training run may use them.
 const REFERENCE_SEEDS: [u64; 2] = [1 << 40, (1 << 40) + 1];
@@ -63,6 +68,14 @@ pub struct RecipeScene {
     pub reference: Option<Reference>,
 }
 
+impl RecipeScene {
+    /// The folder that the scene file is in, which a scene is called by.
+    fn name(&self) -> String {
+        let folder = self.file.parent().and_then(Path::file_name).unwrap_or(self.file.as_os_str());
+        folder.to_string_lossy().into_owned()
+    }
+}
+
 /// What a campaign found.
 pub struct Findings {
     /// The model trained on all scenes, with the table and the references' errors on record.
@@ -91,12 +104,12 @@ impl Recipe {
         let fail = |message: String| BlendError::Load { name: path.display().to_string(), message };
         let text = std::fs::read_to_string(path).map_err(|error| fail(error.to_string()))?;
         let recipe: Self = toml::from_str(&text).map_err(|error| fail(error.to_string()))?;
-        let positive = |time: f64| time > 0.0 && time.is_finite();
+        let positive = |time: f64| time > 0.0 && time <= LONGEST;
         if recipe.integrators[0] == recipe.integrators[1] {
             return Err(fail("`integrators` names one method twice; expected two methods".into()));
         }
         if recipe.times.is_empty() || !recipe.times.iter().all(|t| positive(*t)) || recipe.seeds.is_empty() {
-            return Err(fail("expected at least one time above 0 in `times` and one seed in `seeds`".into()));
+            return Err(fail("expected at least one time from 0 to 1e7 in `times` and one seed in `seeds`".into()));
         }
         if recipe.seeds.iter().any(|seed| REFERENCE_SEEDS.contains(seed)) {
             return Err(fail("`seeds` holds a seed that is reserved for references".into()));
@@ -107,9 +120,19 @@ impl Recipe {
                 return Err(fail("a reference by sppm would be biased; expected path, bdpt or mmlt".into()));
             }
             if !positive(reference.time) {
-                return Err(fail("expected a reference time above 0".into()));
+                return Err(fail("expected a reference time from 0 to 1e7".into()));
             }
         }
+        let mut names: Vec<String> = recipe.scenes.iter().map(RecipeScene::name).collect();
+        names.sort();
+        if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(fail(format!("two scenes are called `{}` after their folder; expected one", twice[0])));
+        }
+        if names.len() < 2 {
+            return Err(BlendError::TooFewScenes { found: names.len() });
+        }
+        recipe.learning.rows.check()?;
+        recipe.learning.forest.check()?;
         Ok(recipe)
     }
 
@@ -167,9 +190,8 @@ impl Recipe {
         let options = load::Options { size: Some(self.size), ..load::Options::default() };
         let load = |entry: &RecipeScene| {
             let path = folder.join(&entry.file);
-            let name = path.parent().and_then(Path::file_name).unwrap_or(path.as_os_str());
             let loaded = load::read(&path, &options).map_err(|error| failed(&path.display().to_string(), error))?;
-            Ok((name.to_string_lossy().into_owned(), loaded.scene))
+            Ok((entry.name(), loaded.scene))
         };
         self.scenes.iter().map(load).collect()
     }
@@ -200,6 +222,15 @@ impl Recipe {
     }
 }
 
+/// Fingerprint of the running program.
+fn program() -> &'static str {
+    static HASH: OnceLock<String> = OnceLock::new();
+    HASH.get_or_init(|| {
+        let bytes = std::env::current_exe().and_then(std::fs::read).unwrap_or_default();
+        blake3::hash(&bytes).to_hex().to_string()
+    })
+}
+
 fn failed(name: &str, error: impl std::fmt::Display) -> BlendError {
     BlendError::Load { name: name.to_owned(), message: error.to_string() }
 }
@@ -207,7 +238,7 @@ fn failed(name: &str, error: impl std::fmt::Display) -> BlendError {
 impl Task<'_> {
     fn path(&self, cache: &Path) -> PathBuf {
         let key = json!({
-            "software": env!("CARGO_PKG_VERSION"),
+            "software": if REFERENCE_SEEDS.contains(&self.seed) { env!("CARGO_PKG_VERSION") } else { program() },
             "scene": self.scene.hash,
             "size": self.scene.camera.size,
             "max_depth": self.scene.max_depth,

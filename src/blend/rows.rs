@@ -34,7 +34,7 @@ impl Default for RowSettings {
 }
 
 impl RowSettings {
-    fn check(&self) -> Result<(), BlendError> {
+    pub(super) fn check(&self) -> Result<(), BlendError> {
         if !(self.stake_quantile > 0.0 && self.stake_quantile <= 1.0) {
             let (name, found) = ("stake_quantile", self.stake_quantile.to_string());
             return Err(BlendError::Setting { name, found, expected: "more than 0, up to 1" });

@@ -75,8 +75,8 @@ impl Camera {
         SolidAnglePdf(1.0 / (4.0 * self.half.x * self.half.y * cos * cos * cos))
     }
 
-    /// Angle that a pixel in the middle of the film subtends, in radians.
-    pub fn pixel_angle(&self) -> f64 {
+    /// Width of a pixel in the plane at distance 1.
+    pub fn pixel_width(&self) -> f64 {
         2.0 * self.half.x / self.size[0] as f64
     }
 }

@@ -3,7 +3,7 @@
 use super::blend::model;
 use super::progress::Reporter;
 use super::render::parse_threads;
-use super::{SceneArguments, check_output, on_threads, parse_time};
+use super::{SceneArguments, check_output, on_threads, parse_time, say};
 use crate::blend::{self, Input, weight_layer};
 use crate::image::{Image, Layer, WriteOptions, write_false_colour, write_png};
 use crate::integrators::{Budget, Method, Settings, render};
@@ -39,7 +39,7 @@ pub(super) struct Auto {
 
 impl Auto {
     pub(super) fn run(self) -> anyhow::Result<()> {
-        check_output(&self.output)?;
+        check_output(&self.output, "exr", &[&self.scene.scene])?;
         let model = model(self.model.as_deref())?;
         let scene = self.scene.load()?;
         let mut inputs = Vec::new();
@@ -55,19 +55,15 @@ impl Auto {
             inputs.push((name, image));
         }
         let [(name_a, a), (name_b, b)] = &inputs[..] else { anyhow::bail!("a model blends two methods") };
-        let image = if scene.has_lights() {
-            blend::apply(&model, Input::new(name_a, a), Input::new(name_b, b))?
-        } else {
-            a.clone() // black, without path layers to go by
-        };
+        let image = on_threads(self.threads, || blend::apply(&model, Input::new(name_a, a), Input::new(name_b, b)))??;
         image.write(&self.output, &WriteOptions::default())?;
         let picture = self.output.with_extension("png");
         write_png(&picture, image.colour.view(), 0.0)?;
-        println!("wrote {} and {}", self.output.display(), picture.display());
+        say(format_args!("wrote {} and {}", self.output.display(), picture.display()))?;
         if let Some(Layer::Luminance(weights)) = image.layers.get(&weight_layer(name_a)) {
             let map = self.beside("weight", "png");
             write_false_colour(&map, weights.view())?;
-            println!("wrote {}: orange is {name_a}, blue is {name_b}", map.display());
+            say(format_args!("wrote {}: orange is {name_a}, blue is {name_b}", map.display()))?;
         }
         Ok(())
     }

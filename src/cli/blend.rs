@@ -1,6 +1,6 @@
 //! `pathblend blend`.
 
-use super::check_output;
+use super::{check_output, say};
 use crate::blend::{self, Input};
 use crate::forest::Model;
 use crate::image::{Image, WriteOptions, write_png};
@@ -34,7 +34,10 @@ pub(super) fn model(path: Option<&Path>) -> anyhow::Result<Model> {
 
 impl Blend {
     pub(super) fn run(self) -> anyhow::Result<()> {
-        check_output(&self.output)?;
+        check_output(&self.output, "exr", &[&self.a, &self.b])?;
+        if let Some(png) = &self.png {
+            check_output(png, "png", &[])?;
+        }
         let model = model(self.model.as_deref())?;
         let (a, b) = (Image::read(&self.a)?, Image::read(&self.b)?);
         let (name_a, name_b) = (self.a.display().to_string(), self.b.display().to_string());
@@ -45,11 +48,7 @@ impl Blend {
         if let Some(png) = &self.png {
             write_png(png, image.colour.view(), 0.0)?;
         }
-        println!(
-            "blended {name_a} and {name_b} in {:.0} ms, wrote {}",
-            time.as_secs_f64() * 1e3,
-            self.output.display()
-        );
-        Ok(())
+        let (time, output) = (time.as_secs_f64() * 1e3, self.output.display());
+        say(format_args!("blended {name_a} and {name_b} in {time:.0} ms, wrote {output}"))
     }
 }

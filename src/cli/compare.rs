@@ -1,5 +1,6 @@
 //! `pathblend compare`.
 
+use super::say;
 use crate::image::{Image, metrics};
 use anyhow::Context;
 use clap::Args;
@@ -23,10 +24,10 @@ impl Compare {
         let found = metrics::compare(&image, &reference)
             .with_context(|| format!("cannot compare {} with {}", self.image.display(), self.reference.display()))?;
         if self.json {
-            println!("{}", serde_json::to_string(&found)?);
+            say(format_args!("{}", serde_json::to_string(&found)?))?;
             return Ok(());
         }
-        println!("{:<10} {:>12} {:>12}", "", "all", "trimmed");
+        say(format_args!("{:<10} {:>12} {:>12}", "", "all", "trimmed"))?;
         let rows = [
             ("MSE", found.mse, found.trimmed.mse),
             ("RMSE", found.rmse, found.trimmed.rmse),
@@ -36,10 +37,13 @@ impl Compare {
             ("FLIP (LDR)", found.flip, found.trimmed.flip),
         ];
         for (name, all, trimmed) in rows {
-            println!("{name:<10} {all:>12.6} {trimmed:>12.6}");
+            say(format_args!("{name:<10} {all:>12.6} {trimmed:>12.6}"))?;
         }
-        println!("{:<10} {:>12.6}", "mean ratio", found.mean_ratio);
-        println!("trimmed: without the 0.1 % worst of {} pixels; {} pixels not finite", found.pixels, found.nonfinite);
+        say(format_args!("{:<10} {:>12.6}", "mean ratio", found.mean_ratio))?;
+        say(format_args!(
+            "trimmed: without the 0.1 % worst of {} pixels; {} pixels not finite",
+            found.pixels, found.nonfinite
+        ))?;
         Ok(())
     }
 }

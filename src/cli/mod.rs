@@ -9,6 +9,7 @@ mod train;
 
 use anyhow::{Context, bail};
 use clap::{Args, Parser, Subcommand};
+use std::io::Write;
 use std::path::Path;
 use std::time::Duration;
 
@@ -95,25 +96,34 @@ fn on_threads<R: Send>(threads: Option<usize>, work: impl FnOnce() -> R + Send) 
     Ok(builder.build().context("cannot start the threads")?.install(work))
 }
 
-/// An output file must be an EXR in a folder that exists: said before the work, not after it.
-fn check_output(path: &Path) -> anyhow::Result<()> {
-    if !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr")) {
-        bail!("cannot write {}: expected a name that ends in .exr", path.display());
+/// An output file must have the extension `extension`, must be none of the `inputs`, and must be writable: said before the
+/// work, not after it.
+fn check_output(path: &Path, extension: &str, inputs: &[&Path]) -> anyhow::Result<()> {
+    if !path.extension().is_some_and(|found| found.eq_ignore_ascii_case(extension)) {
+        bail!("cannot write {}: expected a name that ends in .{extension}", path.display());
+    }
+    if path.is_dir() {
+        bail!("cannot write {}: it is a folder", path.display());
+    }
+    let real = std::fs::canonicalize(path).ok();
+    if real.is_some() && inputs.iter().any(|input| std::fs::canonicalize(input).ok() == real) {
+        bail!("cannot write {}: it is an input of the same command", path.display());
     }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if !folder.is_dir() {
         bail!("cannot write {}: the folder {} does not exist", path.display(), folder.display());
     }
+    // The only sure way to know that files can be made there is to make one.
+    tempfile::tempfile_in(folder).with_context(|| format!("cannot write {}", path.display()))?;
     Ok(())
 }
 
-/// Writes a model, with its size in bytes as the result.
-fn write_model(model: &crate::forest::Model, path: &Path) -> anyhow::Result<u64> {
-    if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-        std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+/// Prints a line. A reader that has gone away, such as `head`, is no error.
+fn say(line: std::fmt::Arguments<'_>) -> anyhow::Result<()> {
+    match writeln!(std::io::stdout(), "{line}") {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(()),
     }
-    model.save(path)?;
-    Ok(std::fs::metadata(path)?.len())
 }
 
 /// `30s`, `1.5m`, `2h`, `500ms`; a bare number means seconds.

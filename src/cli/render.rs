@@ -1,7 +1,7 @@
 //! `pathblend render`.
 
 use super::progress::Reporter;
-use super::{SceneArguments, check_output, on_threads, parse_time};
+use super::{SceneArguments, check_output, on_threads, parse_time, say};
 use crate::image::{Precision, WriteOptions, write_png};
 use crate::integrators::{Budget, Method, Settings, render};
 use clap::Args;
@@ -21,7 +21,7 @@ pub(super) struct Render {
     /// Render for this long (such as 30s, 5m, 2h), to the nearest pass. Default: 30s.
     #[arg(long, value_name = "TIME", value_parser = parse_time, conflicts_with = "passes")]
     time: Option<Duration>,
-    /// Render this many passes: the same image on any machine with any number of threads.
+    /// Render this many passes: the same image, bit for bit, on any number of threads.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     passes: Option<u64>,
     /// Seed of the random numbers.
@@ -57,7 +57,10 @@ pub(super) fn parse_threads(text: &str) -> Result<usize, String> {
 
 impl Render {
     pub(super) fn run(self) -> anyhow::Result<()> {
-        check_output(&self.output)?;
+        check_output(&self.output, "exr", &[&self.scene.scene])?;
+        if let Some(png) = &self.png {
+            check_output(png, "png", &[])?;
+        }
         let scene = self.scene.load()?;
         let budget = match (self.passes, self.time) {
             (Some(passes), _) => Budget::Passes(passes),
@@ -73,18 +76,18 @@ impl Render {
             write_png(png, outcome.image.colour.view(), 0.0)?;
         }
         if self.json {
-            println!("{}", serde_json::to_string(&outcome.summary())?);
+            say(format_args!("{}", serde_json::to_string(&outcome.summary())?))?;
         } else {
             let (wall, cpu) = (outcome.wall.as_secs_f64(), outcome.cpu.as_secs_f64());
             let counts = &outcome.counts;
-            println!(
+            say(format_args!(
                 "{}: {} passes in {wall:.2} s ({cpu:.2} s of processor time): {:.3} M samples/s, {:.2} M rays/s; {}",
                 self.integrator.name(),
                 outcome.passes,
                 counts.samples as f64 / wall / 1e6,
                 counts.rays as f64 / wall / 1e6,
                 outcome.health
-            );
+            ))?;
         }
         Ok(())
     }

@@ -1,8 +1,9 @@
 //! `pathblend train`.
 
 use super::render::parse_threads;
-use super::{on_threads, write_model};
+use super::{check_output, on_threads, say};
 use crate::blend::Recipe;
+use anyhow::Context;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -26,23 +27,28 @@ pub(super) struct Train {
 
 impl Train {
     pub(super) fn run(self) -> anyhow::Result<()> {
+        let output = if self.output.extension().is_none() { self.output.with_extension("json") } else { self.output };
+        if let Some(folder) = output.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+            std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+        }
+        check_output(&output, "json", &[&self.recipe])?;
         let recipe = Recipe::read(&self.recipe)?;
         let folder = self.recipe.parent().unwrap_or(Path::new("."));
         let cache = self.cache.clone().unwrap_or_else(|| folder.join("cache"));
         let findings = on_threads(self.threads, || recipe.run(folder, &cache, |line| eprintln!("{line}")))??;
-        let output = if self.output.extension().is_none() { self.output.with_extension("json") } else { self.output };
-        let bytes = write_model(&findings.model, &output)?;
+        findings.model.save(&output)?;
+        let bytes = std::fs::metadata(&output)?.len();
         if self.json {
-            println!("{}", serde_json::to_string(&findings.table)?);
-            return Ok(());
+            return say(format_args!("{}", serde_json::to_string(&findings.table)?));
         }
-        println!("Root mean squared errors on scenes that the forest did not see; `alone` has the time of both:\n");
-        print!("{}", findings.table);
-        println!("\nErrors of the references, from the difference of their halves:");
+        say(format_args!(
+            "Root mean squared errors on scenes that the forest did not see; `alone` has the time of both:"
+        ))?;
+        say(format_args!("\n{}", findings.table))?;
+        say(format_args!("Errors of the references, from the difference of their halves:"))?;
         for (scene, error) in &findings.reference_errors {
-            println!("  {scene}: {error:.5}");
+            say(format_args!("  {scene}: {error:.5}"))?;
         }
-        println!("\nwrote {} ({bytes} bytes)", output.display());
-        Ok(())
+        say(format_args!("\nwrote {} ({bytes} bytes)", output.display()))
     }
 }

@@ -49,7 +49,7 @@ pub enum Emitter {
 }
 
 impl Emitter {
-    /// Samples a start from the last three numbers of `row`, with its density: per area, for an infinite start per
+    /// Samples a start from the two middle numbers of `row` (the first has chosen the emitter), with its density: per area, for an infinite start per
     /// solid angle, for a point 1.
     #[inline]
     pub fn start(&self, row: Row) -> (Start, AreaPdf) {

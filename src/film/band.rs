@@ -1,6 +1,6 @@
 //! Some rows of the film.
 
-use super::{Health, PathClass, Splat, class::CLASSES};
+use super::{Health, Kernel, PathClass, Splat, class::CLASSES};
 use crate::spectrum::Spectrum;
 
 /// Sums for the pixels of some rows.
@@ -39,17 +39,23 @@ impl Band {
         self.add_at((y - self.first_row) * self.width + x, class, value);
     }
 
-    pub(super) fn splat(&mut self, splat: &Splat) {
+    /// Adds a splat to the pixels of the band that the filter reaches; `size` is that of the film.
+    pub(super) fn splat(&mut self, kernel: &Kernel, size: [usize; 2], splat: &Splat) {
         let [r, g, b] = splat.value.map(f64::from);
-        let index = splat.pixel as usize - self.first_row * self.width;
-        self.add_at(index, splat.class, Spectrum::rgb(r, g, b));
+        let value = Spectrum::rgb(r, g, b);
+        let (first, end) = (self.first_row, self.first_row + self.rows);
+        kernel.pixels_near(f64::from(splat.film[1]), size[1], |y, weight_y| {
+            if (first..end).contains(&y) {
+                kernel.pixels_near(f64::from(splat.film[0]), size[0], |x, weight_x| {
+                    self.add([x, y], splat.class, value * (weight_x * weight_y));
+                });
+            }
+        });
     }
 
     #[inline]
     fn add_at(&mut self, index: usize, class: PathClass, value: Spectrum) {
-        if !value.is_valid() {
-            let finite = value.to_rgb().iter().all(|c| c.is_finite());
-            *(if finite { &mut self.health.negative } else { &mut self.health.nonfinite }) += 1;
+        if !self.health.accepts(value) {
             return;
         }
         let sum = &mut self.colour[index];

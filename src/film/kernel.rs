@@ -91,15 +91,26 @@ impl Kernel {
         (center + x).clamp(0.0, pixels as f64 * (1.0 - f64::EPSILON))
     }
 
-    /// Calls `each(pixel, weight)` for the pixels along one axis whose filter reaches the film coordinate `x`.
+    /// The first and the last pixel along one axis whose filter may reach the film coordinate `x`.
     #[inline]
-    pub fn pixels_near(&self, x: f64, pixels: usize, mut each: impl FnMut(usize, f64)) {
+    pub fn reach(&self, x: f64, pixels: usize) -> (usize, usize) {
         if self.bins() == 1 {
-            each((x as usize).min(pixels - 1), 1.0);
-            return;
+            let pixel = (x as usize).min(pixels - 1);
+            return (pixel, pixel);
         }
         let first = (x - self.radius - 0.5).ceil().max(0.0) as usize;
         let last = ((x + self.radius - 0.5).floor().max(0.0) as usize).min(pixels - 1);
+        (first.min(last), last)
+    }
+
+    /// Calls `each(pixel, weight)` for the pixels along one axis whose filter reaches the film coordinate `x`.
+    #[inline]
+    pub fn pixels_near(&self, x: f64, pixels: usize, mut each: impl FnMut(usize, f64)) {
+        let (first, last) = self.reach(x, pixels);
+        if self.bins() == 1 {
+            each(first, 1.0);
+            return;
+        }
         for pixel in first..=last {
             let center = pixel as f64 + 0.5;
             let mass = self.below(pixels as f64 - center) - self.below(-center);

@@ -15,6 +15,7 @@ pub use kernel::{Filter, Kernel};
 pub use splat::{Splat, Splats};
 
 use crate::image::{Image, Layer};
+use crate::spectrum::Spectrum;
 use ndarray::{Array2, Array3};
 use rayon::prelude::*;
 
@@ -40,6 +41,17 @@ impl std::fmt::Display for Health {
 }
 
 impl Health {
+    /// Counts `value` where it is no valid contribution; says whether it is one.
+    #[inline]
+    pub fn accepts(&mut self, value: Spectrum) -> bool {
+        if value.is_valid() {
+            return true;
+        }
+        let finite = value.to_rgb().iter().all(|c| c.is_finite());
+        *(if finite { &mut self.negative } else { &mut self.nonfinite }) += 1;
+        false
+    }
+
     /// Adds the counts of another job.
     pub fn add(&mut self, other: &Self) {
         self.nonfinite += other.nonfinite;
@@ -54,6 +66,10 @@ pub struct Film {
     /// Reconstruction filter.
     pub kernel: Kernel,
     bands: Vec<Band>,
+    /// Whether class luminances are kept.
+    features: bool,
+    /// What went wrong before it reached a band.
+    elsewhere: Health,
 }
 
 impl Film {
@@ -65,7 +81,7 @@ impl Film {
                 Band::new(size[0], first_row, BAND_ROWS.min(size[1] - first_row), features)
             })
             .collect();
-        Self { size, kernel: Kernel::new(filter), bands }
+        Self { size, kernel: Kernel::new(filter), bands, features, elsewhere: Health::default() }
     }
 
     /// Runs `job` once for each band, in parallel; results in the order of the bands.
@@ -75,18 +91,24 @@ impl Film {
 
     /// Adds the splats of some jobs, in the order of the jobs.
     pub fn splat(&mut self, jobs: &[Splats]) {
+        let (kernel, size) = (&self.kernel, self.size);
         self.bands.par_iter_mut().enumerate().for_each(|(index, band)| {
             for splats in jobs {
                 for splat in splats.band(index) {
-                    band.splat(splat);
+                    band.splat(kernel, size, splat);
                 }
             }
         });
     }
 
+    /// Adds what went wrong before it reached the film.
+    pub fn report(&mut self, health: &Health) {
+        self.elsewhere.add(health);
+    }
+
     /// What went wrong so far.
     pub fn health(&self) -> Health {
-        let mut health = Health::default();
+        let mut health = self.elsewhere;
         self.bands.iter().for_each(|band| health.add(&band.health));
         health
     }
@@ -98,8 +120,11 @@ impl Film {
         image.colour = Array3::from_shape_fn((height, width, 3), |(y, x, c)| {
             (self.bands[y / BAND_ROWS].colour(x, y)[c] / passes) as f32
         });
+        let occurs = |class| self.bands.iter().any(|band| band.has(class));
+        // An image without any light still says that it has class layers.
+        let dark = self.features && !PathClass::all().any(occurs);
         for class in PathClass::all() {
-            if self.bands.iter().all(|band| !band.has(class)) {
+            if !(occurs(class) || dark && class == Word::EMPTY.class()) {
                 continue;
             }
             let layer = Array2::from_shape_fn((height, width), |(y, x)| {

@@ -4,40 +4,39 @@ use super::{BAND_ROWS, Kernel, PathClass};
 use crate::spectrum::Spectrum;
 use glam::DVec2;
 
-/// A contribution to one pixel.
+/// A contribution at a position on the film.
 #[derive(Clone, Copy, Debug)]
 pub struct Splat {
-    /// y × width + x.
-    pub pixel: u32,
+    /// Position in pixels.
+    pub film: [f32; 2],
     /// Its path class.
     pub class: PathClass,
     /// Linear Rec.709.
     pub value: [f32; 3],
 }
 
-/// The splats of one job, sorted by the band that they fall into.
+/// The splats of one job, sorted by the bands that their filter reaches.
 pub struct Splats {
-    size: [usize; 2],
+    rows: usize,
     bands: Vec<Vec<Splat>>,
 }
 
 impl Splats {
     /// No splats, for a film of `size`.
     pub fn new(size: [usize; 2]) -> Self {
-        Self { size, bands: vec![Vec::new(); size[1].div_ceil(BAND_ROWS)] }
+        Self { rows: size[1], bands: vec![Vec::new(); size[1].div_ceil(BAND_ROWS)] }
     }
 
-    /// Adds `value` at the film position `film` to all pixels within reach of the filter. The weights of a position
-    /// integrate to one over each pixel, so `value` has the scale of a pixel's mean.
+    /// Adds `value` at the film position `film`. The weights of a position integrate to one over each pixel, so `value`
+    /// has the scale of a pixel's mean.
     #[inline]
     pub fn add(&mut self, kernel: &Kernel, film: DVec2, class: PathClass, value: Spectrum) {
-        let [width, height] = self.size;
-        kernel.pixels_near(film.y, height, |y, weight_y| {
-            kernel.pixels_near(film.x, width, |x, weight_x| {
-                let value = (value * (weight_x * weight_y)).to_rgb().map(|v| v as f32);
-                self.bands[y / BAND_ROWS].push(Splat { pixel: (y * width + x) as u32, class, value });
-            });
-        });
+        // Rounded before the rows are found: the band that applies the filter must find the same ones.
+        let splat = Splat { film: film.as_vec2().to_array(), class, value: value.to_rgb().map(|v| v as f32) };
+        let (first, last) = kernel.reach(f64::from(splat.film[1]), self.rows);
+        for band in first / BAND_ROWS..=last / BAND_ROWS {
+            self.bands[band].push(splat);
+        }
     }
 
     pub(super) fn band(&self, index: usize) -> &[Splat] {

@@ -56,7 +56,11 @@ impl Default for Settings {
 }
 
 impl Settings {
-    fn check(&self) -> Result<(), ForestError> {
+    /// Checks the ranges.
+    ///
+    /// # Errors
+    /// [`ForestError::Setting`] for the first that is out of its range.
+    pub fn check(&self) -> Result<(), ForestError> {
         let wrong = |name, found: String, expected| Err(ForestError::Setting { name, found, expected });
         if !(1..=1000).contains(&self.trees) {
             return wrong("trees", self.trees.to_string(), "1 to 1000");

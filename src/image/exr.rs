@@ -2,7 +2,7 @@
 //!
 //! Samples are 32-bit floats (or halves, where asked for) in ZIP-compressed scan lines. The manifest is one
 //! string attribute, `pathblend`; what pbrt names itself is also written under pbrt's names, so that scripts
-//! made for pbrt's files find it. See design.md, section 4, "Images".
+//! made for pbrt's files find it. See `ARCHITECTURE.md`, "Images".
 
 mod decode;
 mod encode;

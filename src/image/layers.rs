@@ -10,6 +10,8 @@ use super::{ImageError, WriteOptions, exr};
 
 /// Manifest key under which an image names its integrator.
 pub const INTEGRATOR_KEY: &str = "integrator";
+/// Manifest key under which an image gives the length of its longest paths, in edges.
+pub const DEPTH_KEY: &str = "max_depth";
 /// Manifest key under which an image names its scene's fingerprint.
 pub const SCENE_KEY: &str = "scene_hash";
 

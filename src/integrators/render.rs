@@ -2,7 +2,7 @@
 
 use super::{Counts, Integrator, Method};
 use crate::film::{Film, Health, PathClass};
-use crate::image::{INTEGRATOR_KEY, Image, SCENE_KEY};
+use crate::image::{DEPTH_KEY, INTEGRATOR_KEY, Image, SCENE_KEY};
 use crate::scene::Scene;
 use cpu_time::ProcessTime;
 use serde_json::{Map, Value, json};
@@ -24,7 +24,7 @@ pub struct Settings {
 /// When to stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Budget {
-    /// After this many passes: the image depends on the seed alone, not on the machine or its threads.
+    /// After this many passes: the image depends on the seed alone, not on the number of threads.
     Passes(u64),
     /// After this much wall-clock time, to the nearest pass, but not before the first.
     Wall(Duration),
@@ -130,7 +130,7 @@ fn manifest(scene: &Scene, method: Method, settings: &Settings, outcome: &Outcom
     set(SCENE_KEY, json!(scene.hash));
     set(INTEGRATOR_KEY, json!(method.name()));
     set("seed", json!(settings.seed));
-    set("max_depth", json!(settings.max_depth));
+    set(DEPTH_KEY, json!(settings.max_depth));
     set("budget", budget);
     set("passes", json!(outcome.passes));
     set("wall_s", json!(outcome.wall.as_secs_f64()));

@@ -39,7 +39,7 @@ pub(super) struct Sppm {
     seed: u64,
     max_depth: usize,
     photons: usize,
-    pixel_angle: f64,
+    pixel_width: f64,
     /// Square of the radius relative to the first one.
     shrinkage: f64,
 }
@@ -74,7 +74,7 @@ impl Sppm {
             seed: settings.seed,
             max_depth: settings.max_depth,
             photons: scene.camera.size.iter().product(),
-            pixel_angle: scene.camera.pixel_angle(),
+            pixel_width: scene.camera.pixel_width(),
             shrinkage: 1.0,
         }
     }
@@ -82,7 +82,7 @@ impl Sppm {
     pub(super) fn pass(&mut self, scene: &Scene, film: &mut Film, pass: u64, counts: &mut Counts) {
         let kernel = film.kernel.clone();
         let size = film.size;
-        let radius = FIRST_RADIUS * self.pixel_angle * self.shrinkage.sqrt();
+        let radius = FIRST_RADIUS * self.pixel_width * self.shrinkage.sqrt();
         let walks = film.for_each_band(|index, band| {
             let caster = Caster::new(scene);
             let mut stream = Stream::new(self.seed, &[0, pass, index as u64]);
@@ -95,11 +95,11 @@ impl Sppm {
         let shot: Vec<(Vec<Photon>, u64)> =
             (0..JOBS).into_par_iter().map(|job| self.shoot(scene, pass, job as u64)).collect();
         let rays = walks.iter().map(|w| w.1).sum::<u64>() + shot.iter().map(|s| s.1).sum::<u64>();
-        let mean_radius = mean(walks.iter().flat_map(|w| &w.0).map(|gather| gather.radius));
-        let grid = Grid::new(shot.into_iter().flat_map(|s| s.0).collect(), 2.0 * mean_radius);
+        let photons: Vec<Photon> = shot.into_iter().flat_map(|s| s.0).collect();
+        let grids = Grids::new(&photons, walks.iter().flat_map(|w| &w.0).map(|gather| gather.radius));
         film.for_each_band(|index, band| {
             for gather in &walks[index].0 {
-                self.gather(scene, &grid, gather, band);
+                self.gather(scene, &grids, gather, band);
             }
         });
         counts.add((self.photons + size[0] * size[1]) as u64, rays);
@@ -181,12 +181,12 @@ impl Sppm {
         (photons, caster.rays())
     }
 
-    fn gather(&self, scene: &Scene, grid: &Grid, gather: &Gather, band: &mut Band) {
+    fn gather(&self, scene: &Scene, grids: &Grids, gather: &Gather, band: &mut Band) {
         let Gather { surface, radius, .. } = gather;
         let wi = surface.frame.to_local(gather.back);
         let bsdf = scene.bsdf(surface.bsdf);
         let scale = gather.throughput / (PI * radius * radius);
-        grid.within(surface.position, *radius, |photon| {
+        grids.within(surface.position, *radius, |photon| {
             let height = (photon.position - surface.position).dot(surface.geometric).abs();
             if height > FLATNESS * radius || photon.edges + gather.edges > self.max_depth {
                 return;
@@ -202,13 +202,48 @@ impl Sppm {
     }
 }
 
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, n) = values.fold((0.0, 0u64), |(sum, n), value| (sum + value, n + 1));
-    if n == 0 { 1.0 } else { sum / n as f64 }
+/// Grids whose cells double in size from one to the next. Radii grow with the distance from the camera; each is served
+/// by the grid whose cells are just as wide as its disk, so that no gather looks at more than eight of them.
+struct Grids {
+    smallest: f64,
+    /// By level; `None` where no radius has that size.
+    levels: Vec<Option<Grid>>,
+}
+
+impl Grids {
+    /// Most levels; smaller radii are served by cells that are larger than need be.
+    const LEVELS: i32 = 24;
+
+    fn new(photons: &[Photon], radii: impl Iterator<Item = f64> + Clone) -> Self {
+        let largest = radii.clone().fold(0.0, f64::max);
+        let least = radii.clone().fold(f64::INFINITY, f64::min).max(largest * 0.5f64.powi(Self::LEVELS - 1));
+        let mut grids = Self { smallest: least, levels: Vec::new() };
+        for radius in radii {
+            let level = grids.level(radius);
+            grids.levels.resize_with(grids.levels.len().max(level + 1), || None);
+            grids.levels[level].get_or_insert_with(|| Grid::new(photons, 2.0 * least * 2f64.powi(level as i32)));
+        }
+        grids
+    }
+
+    /// The first level whose cells are at least as wide as a disk of `radius`.
+    #[inline]
+    fn level(&self, radius: f64) -> usize {
+        (radius / self.smallest).log2().ceil().max(0.0) as usize
+    }
+
+    /// Calls `each` for the photons closer to `center` than `radius`, one of those that the grids were made for.
+    #[inline]
+    fn within(&self, center: DVec3, radius: f64, each: impl FnMut(&Photon)) {
+        if let Some(Some(grid)) = self.levels.get(self.level(radius)) {
+            grid.within(center, radius, each);
+        }
+    }
 }
 
 /// Photons sorted into the cells of a hashed grid.
 struct Grid {
+    /// Width of a cell.
     cell: f64,
     /// Where the photons of each bucket start; one more entry than there are buckets.
     starts: Vec<u32>,
@@ -216,9 +251,9 @@ struct Grid {
 }
 
 impl Grid {
-    fn new(unsorted: Vec<Photon>, cell: f64) -> Self {
+    fn new(unsorted: &[Photon], cell: f64) -> Self {
         let buckets = unsorted.len().next_power_of_two();
-        let mut grid = Self { cell, starts: vec![0; buckets + 1], photons: unsorted.clone() };
+        let mut grid = Self { cell, starts: vec![0; buckets + 1], photons: unsorted.to_vec() };
         let bucket_of: Vec<usize> = unsorted.iter().map(|photon| grid.bucket(grid.cell_of(photon.position))).collect();
         for bucket in &bucket_of {
             grid.starts[bucket + 1] += 1;
@@ -289,12 +324,13 @@ mod tests {
                 edges: 2,
             })
             .collect();
-        let grid = Grid::new(photons.clone(), 0.2);
-        for radius in [0.01, 0.1, 0.5, 1.0] {
+        let radii = [0.01, 0.1, 0.5, 1.0];
+        let grids = Grids::new(&photons, radii.into_iter());
+        for radius in radii {
             for _ in 0..50 {
                 let center = point(3.5);
                 let mut found = 0;
-                grid.within(center, radius, |_| found += 1);
+                grids.within(center, radius, |_| found += 1);
                 let expected = photons.iter().filter(|p| p.position.distance(center) < radius).count();
                 assert_eq!(found, expected);
             }

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-/// A right-handed orthonormal basis; `normal` is the local z axis.
+/// An orthonormal basis; `normal` is the local z axis. Right-handed unless a camera asks for its mirror image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame {
     /// Local x axis in world space.

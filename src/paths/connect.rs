@@ -189,6 +189,10 @@ fn reach_camera(
     heuristic: Heuristic,
 ) -> Option<Connection> {
     let lens = camera[0].position;
+    // Lights seen directly are left to the walk from the camera, which finds every one of them.
+    if light.len() == 1 {
+        return None;
+    }
     if start.delta || matches!(start.kind, VertexKind::Light(_, Start::Infinite { .. } | Start::Point { .. })) {
         return None;
     }
@@ -212,10 +216,6 @@ fn reach_camera(
         light_previous: light_end.previous,
         ..Junction::default()
     };
-    // Lights seen directly are left to the walk from the camera, which finds every one of them.
-    if light.len() == 1 {
-        return None;
-    }
     let weight = mis::weight(light, camera, &junction, heuristic);
     Some(Connection { value: value * weight, class: light_end.word.class(), film: Some(film) })
 }

@@ -116,7 +116,7 @@ fn walk(
     roulette_from: usize,
     path: &mut Subpath,
 ) {
-    // Both walks read row i at vertex i; from a light, row 1 went into the emission, so scattering is one row later.
+    // Scattering at vertex i reads row i of a walk from the camera, row i + 1 of one from a light: row 1 is the emission.
     let row_shift = usize::from(mode == Walk::FromLight);
     let mut alive = 1.0;
     while path.vertices.len() < vertices {

@@ -98,8 +98,14 @@ impl Builder {
         if let Some(index) = mesh.triangles.iter().flatten().find(|i| **i as usize >= mesh.positions.len()) {
             return Err(SceneError::VertexOutOfRange { index: *index, vertices: mesh.positions.len() });
         }
-        let corner = |i: u32| mesh.positions[i as usize].as_dvec3();
-        let surface = |()| Surface::triangles(mesh.triangles.iter().map(|t| t.map(corner)));
+        // Light shines on the side that the vertex normals point to, as `Builder::face` has it.
+        let corners = |triangle: &[u32; 3]| {
+            let [a, b, c] = triangle.map(|i| mesh.positions[i as usize].as_dvec3());
+            let normals = triangle.iter().filter_map(|i| mesh.normals.get(*i as usize));
+            let towards = normals.sum::<Vec3>().as_dvec3();
+            if (b - a).cross(c - a).dot(towards) < 0.0 { [a, c, b] } else { [a, b, c] }
+        };
+        let surface = |()| Surface::triangles(mesh.triangles.iter().map(corners));
         let shape = self.shape(bsdf, radiance, surface)?;
         let base = self.vertices.len() as u32;
         self.triangles.extend(mesh.triangles.iter().map(|t| t.map(|i| i + base)));
@@ -166,8 +172,10 @@ impl Builder {
     /// Triangles without area have no normal; no ray hits them.
     fn face(&self, triangle: &[u32; 3]) -> Face {
         let [a, b, c] = triangle.map(|i| self.vertices[i as usize].as_dvec3());
+        let towards: Vec3 = triangle.iter().map(|i| self.normals[*i as usize]).sum();
+        let normal = geometric_normal(a, b, c).unwrap_or(DVec3::Z);
         Face {
-            normal: geometric_normal(a, b, c).unwrap_or(DVec3::Z),
+            normal: if normal.dot(towards.as_dvec3()) < 0.0 { -normal } else { normal },
             offset: offset::of_triangle(a, b, c),
             smooth: triangle.iter().any(|i| self.normals[*i as usize] != Vec3::ZERO),
         }

@@ -47,13 +47,14 @@ impl<'a> Caster<'a> {
         self.scene.intersect(&Ray::new(origin.point, direction), origin.triangle)
     }
 
-    /// Whether nothing lies between two points, which the caller has moved off their surfaces.
+    /// Whether nothing lies between two points, which the caller has moved off their surfaces. The ray ends short of the
+    /// far point by 1e-10 of its length, since the rounding of a hit's distance grows with it.
     #[inline]
     pub fn visible(&self, from: Origin, to: DVec3) -> bool {
         let offset = to - from.point;
         let distance = offset.length();
         let direction = offset * (1.0 / distance);
-        !self.occluded(&Ray { origin: from.point, direction, tmax: distance }, from.triangle)
+        !self.occluded(&Ray { origin: from.point, direction, tmax: distance * (1.0 - 1e-10) }, from.triangle)
     }
 
     /// Whether the ray from `origin` along `direction` leaves the scene.

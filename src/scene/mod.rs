@@ -33,7 +33,7 @@ struct Shape {
 /// What every point of a triangle shares.
 #[derive(Clone, Copy, Debug)]
 struct Face {
-    /// Unit normal, counter-clockwise.
+    /// Unit normal, on the side that the vertex normals point to; without these counter-clockwise.
     normal: DVec3,
     /// Distance by which rays are started off the triangle.
     offset: f64,
@@ -49,7 +49,7 @@ pub struct Scene {
     pub film: FilmSpec,
     /// Longest path in edges that the scene file asks for.
     pub max_depth: usize,
-    /// Fingerprint of everything that decides the image.
+    /// Fingerprint of the scene: files, parameters, film size.
     pub hash: String,
     vertices: Vec<Vec3>,
     /// Normals per vertex; zero where a mesh has none.
@@ -86,8 +86,7 @@ impl Scene {
         let Face { normal, offset, smooth } = self.faces[index];
         let (geometric, shading) = if smooth {
             let [na, nb, nc] = corners.map(|i| self.normals[i as usize].as_dvec3());
-            let shading = (na * w + nb * u + nc * v).normalize_or(normal);
-            (if normal.dot(shading) < 0.0 { -normal } else { normal }, shading)
+            (normal, (na * w + nb * u + nc * v).normalize_or(normal))
         } else {
             (normal, normal)
         };

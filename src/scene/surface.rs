@@ -9,7 +9,7 @@ use glam::DVec3;
 pub struct Surface {
     /// The point.
     pub position: DVec3,
-    /// Unit normal of the true surface, on the side of the shading normal.
+    /// Unit normal of the true surface, on the side where it shines.
     pub geometric: DVec3,
     /// Shading frame.
     pub frame: Frame,
