@@ -130,6 +130,11 @@ fn blend_names_the_file_that_does_not_fit() {
     fs::write(path.join("model.json"), r#"{"format": "pathblend forest", "version": 99}"#).unwrap();
     fails(&mut blend(&["a.exr", "b.exr", "--model", "model.json"]), path, &["model.json", "version"]);
     fails(&mut blend(&["a.exr", "missing.exr"]), path, &["missing.exr"]);
+    render(path, "sppm", "short.exr", &["--passes", "1", "--max-depth", "2"]);
+    fails(&mut blend(&["a.exr", "short.exr"]), path, &["short.exr", "longest path `2`", "`9`"]);
+    let mut onto_itself = pathblend();
+    onto_itself.args(["blend", "a.exr", "b.exr", "-o", "a.exr"]);
+    fails(&mut onto_itself, path, &["a.exr", "input"]);
 }
 
 #[test]
@@ -143,6 +148,8 @@ fn wrong_use_is_told_before_any_work() {
     };
     fails(&mut render(&["-o", "x.png"]), path, &["x.png", ".exr"]);
     fails(&mut render(&["-o", "no/where/x.exr"]), path, &["no/where"]);
+    fails(&mut render(&["-o", "x.exr", "--png", "x.exr"]), path, &["x.exr", ".png"]);
+    fails(&mut render(&["-o", "x.exr", "--png", "no/where/x.png"]), path, &["no/where"]);
     fails(&mut render(&["-i", "magic", "-o", "x.exr"]), path, &["magic", "bdpt"]);
     fails(&mut render(&["--passes", "0", "-o", "x.exr"]), path, &["--passes"]);
     fails(&mut render(&["--time", "3 parsecs", "-o", "x.exr"]), path, &["--time"]);
@@ -229,6 +236,30 @@ fn a_camera_inside_a_wall_sees_nothing() {
             .success();
         let image = pathblend::image::Image::read(&path.join("x.exr")).unwrap();
         assert!(image.colour.iter().all(|v| *v == 0.0), "{method}");
+    }
+}
+
+/// Two recipes that would waste a night, refused at once.
+#[test]
+fn bad_recipes_are_refused_before_any_render() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    let head = "integrators = ['bdpt', 'sppm']\nsize = [8, 8]\nseeds = [1]\n\
+        reference = { integrator = 'bdpt', time = 1.0 }\n";
+    let scene = |file: &str| format!("[[scenes]]\nfile = '{file}'\n");
+    let cases = [
+        (format!("{head}times = [1e20]\n{}{}", scene("a/x.xml"), scene("b/x.xml")), "1e7"),
+        (format!("{head}times = [1.0]\n{}{}", scene("a/x.xml"), scene("a/y.xml")), "`a`"),
+        (format!("{head}times = [1.0]\n{}", scene("a/x.xml")), "at least 2"),
+        (format!("{head}times = [1.0]\ncolour = 3\n{}", scene("a/x.xml")), "colour"),
+        (format!("{}times = [1.0]\n", head.replace("integrator = 'bdpt'", "integrator = 'sppm'")), "biased"),
+    ];
+    for (text, part) in cases {
+        let text = if text.contains("[[scenes]]") { text } else { format!("{text}scenes = []\n") };
+        fs::write(path.join("recipe.toml"), text).unwrap();
+        let mut command = pathblend();
+        command.args(["train", "recipe.toml", "-o", "model"]);
+        fails(&mut command, path, &[part]);
     }
 }
 

@@ -1,6 +1,7 @@
 //! Surfaces that shine evenly into the hemisphere of their normal.
 
 use super::Start;
+use crate::geometry::Solid;
 use crate::math::{AreaPdf, Discrete, Frame, Row, SolidAnglePdf, warp};
 use crate::spectrum::Spectrum;
 use glam::DVec3;
@@ -34,22 +35,8 @@ pub enum Surface {
         /// Choice by area.
         choice: Discrete,
     },
-    /// A sphere that shines outwards.
-    Sphere {
-        /// Centre.
-        center: DVec3,
-        /// Radius, positive.
-        radius: f64,
-    },
-    /// A disk.
-    Disk {
-        /// Centre.
-        center: DVec3,
-        /// Unit normal on the shining side.
-        normal: DVec3,
-        /// Radius, positive.
-        radius: f64,
-    },
+    /// A sphere that shines outwards, or a disk.
+    Solid(Solid),
 }
 
 impl Surface {
@@ -65,8 +52,7 @@ impl Surface {
     pub fn area(&self) -> f64 {
         match self {
             Self::Triangles { facets, .. } => facets.iter().map(|facet| facet.area).sum(),
-            Self::Sphere { radius, .. } => 4.0 * PI * radius * radius,
-            Self::Disk { radius, .. } => PI * radius * radius,
+            Self::Solid(solid) => solid.area(),
         }
     }
 
@@ -80,11 +66,11 @@ impl Surface {
                 let at = warp::triangle::sample([u, row[2]]);
                 (facet.corner + facet.edges[0] * at.x + facet.edges[1] * at.y, facet.normal)
             }
-            Self::Sphere { center, radius } => {
+            Self::Solid(Solid::Sphere { center, radius }) => {
                 let normal = warp::sphere::sample([row[1], row[2]]);
                 (*center + normal * *radius, normal)
             }
-            Self::Disk { center, normal, radius } => {
+            Self::Solid(Solid::Disk { center, normal, radius }) => {
                 let at = warp::disk::sample([row[1], row[2]]) * *radius;
                 let frame = Frame::around(*normal);
                 (*center + frame.tangent * at.x + frame.bitangent * at.y, *normal)

@@ -118,15 +118,7 @@ impl Builder {
 
     /// Adds a sphere or a disk, which shines with `radiance` where one is given.
     pub fn solid(&mut self, solid: Solid, bsdf: BsdfId, radiance: Option<Spectrum>) -> Result<(), SceneError> {
-        let surface = |()| {
-            Some(match &solid {
-                Solid::Sphere { center, radius } => Surface::Sphere { center: *center, radius: *radius },
-                Solid::Disk { center, normal, radius } => {
-                    Surface::Disk { center: *center, normal: *normal, radius: *radius }
-                }
-            })
-            .filter(|surface| surface.area() > 0.0)
-        };
+        let surface = |()| Some(Surface::Solid(solid)).filter(|surface| surface.area() > 0.0);
         let shape = self.shape(bsdf, radiance, surface)?;
         self.solids.push(solid);
         self.solid_shapes.push(shape);
