@@ -163,6 +163,64 @@ fn a_sphere_light_has_its_form_factor() {
     }
 }
 
+/// A point light in the centre of a glass ball: all rays meet the glass at right angles, so they pass straight, and what is
+/// reflected passes the centre again and leaves on the other side. The ball might as well not be there. Only walks from the
+/// light find this light: it tests light tracing and photons against E = I cos³θ / h².
+#[test]
+fn a_point_light_in_a_glass_ball_shines_as_if_it_were_bare() {
+    let (height, reflectance, intensity) = (2.0, 0.8, 5.0);
+    let mut builder = Builder::new();
+    let paint = builder.bsdf(diffuse(reflectance));
+    builder.solid(Solid::Disk { center: DVec3::ZERO, normal: DVec3::Z, radius: 10.0 }, paint, None).unwrap();
+    let glass = builder.bsdf(Bsdf::Dielectric(Dielectric {
+        eta: 1.5,
+        specular_reflectance: Spectrum::ONE,
+        specular_transmittance: Spectrum::ONE,
+    }));
+    let center = DVec3::new(0.0, 0.0, height);
+    builder.solid(Solid::Sphere { center, radius: 0.2 }, glass, None).unwrap();
+    builder.emitter(Shine::Point(center, Spectrum::grey(intensity))).unwrap();
+    // Looks down from below the ball at the square [-1, 1]² of the floor.
+    let scene = build(builder, camera(DVec3::Z, -DVec3::Z, 1.0), 6);
+    let n = 200;
+    let radiance = |i: usize| {
+        let (x, y) = ((i % n) as f64 / n as f64, (i / n) as f64 / n as f64);
+        let distance_squared = (2.0 * x - 1.0).powi(2) + (2.0 * y - 1.0).powi(2) + height * height;
+        reflectance / std::f64::consts::PI * intensity * height / distance_squared.powf(1.5)
+    };
+    let expected = (0..n * n).map(radiance).sum::<f64>() / (n * n) as f64;
+    for method in [Method::Bdpt, Method::Sppm, Method::Mmlt] {
+        expect(&scene, method, 250, "beauty", expected, colour_mean);
+        // The first interface lets 96 % pass, and each way back again 96 % of the rest.
+        let class = |image: &Image| layer_mean(image, "path_LSDE");
+        expect(&scene, method, 250, "LSDE", 0.96 * expected, class);
+        let class = |image: &Image| layer_mean(image, "path_LSSDE");
+        expect(&scene, method, 250, "LSSDE", 0.04 * 0.96 * expected, class);
+    }
+}
+
+/// A lamp under glass, seen from above: radiance is squeezed by 1/η², and the boundary keeps 4 % of it.
+#[test]
+fn a_lamp_under_glass_is_dimmed_by_the_squared_index() {
+    let mut builder = Builder::new();
+    let black = builder.bsdf(diffuse(0.0));
+    let lamp = Solid::Disk { center: DVec3::ZERO, normal: DVec3::Z, radius: 1.0 };
+    builder.solid(lamp, black, Some(Spectrum::grey(3.0))).unwrap();
+    let glass = builder.bsdf(Bsdf::Dielectric(Dielectric {
+        eta: 1.5,
+        specular_reflectance: Spectrum::ONE,
+        specular_transmittance: Spectrum::ONE,
+    }));
+    // The surface of the glass; the disk's normal points to the outside.
+    builder
+        .solid(Solid::Disk { center: DVec3::new(0.0, 0.0, 0.5), normal: DVec3::Z, radius: 2.0 }, glass, None)
+        .unwrap();
+    let scene = build(builder, camera(DVec3::new(0.0, 0.0, 2.0), -DVec3::Z, 1e-3), 3);
+    for method in METHODS {
+        expect(&scene, method, 64, "beauty", 3.0 * 0.96 / 2.25, colour_mean);
+    }
+}
+
 /// A room of several materials without closed form: all unbiased methods agree, image and classes.
 #[test]
 fn the_unbiased_methods_agree_class_by_class() {
