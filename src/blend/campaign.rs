@@ -3,7 +3,7 @@
 //!
 //! Every image of a campaign is cached by the fingerprint of all that decides it, so that an interrupted campaign goes on
 //! where it stopped and recipes share what they have in common. What a method does in a given time is decided by the
-//! program too, so its fingerprint is part of theirs; references are the same by any sound program.
+//! sources of the renderer too, so their fingerprint is part of it; references are the same by any sound renderer.
 
 use super::{BlendError, Objective, Options, Pair, Table, leave_one_out, train};
 use crate::forest::Model;
@@ -15,7 +15,6 @@ use ndarray::Zip;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
 use std::time::Duration;
 
 /// Longest time, in seconds.
@@ -222,14 +221,8 @@ impl Recipe {
     }
 }
 
-/// Fingerprint of the running program.
-fn program() -> &'static str {
-    static HASH: OnceLock<String> = OnceLock::new();
-    HASH.get_or_init(|| {
-        let bytes = std::env::current_exe().and_then(std::fs::read).unwrap_or_default();
-        blake3::hash(&bytes).to_hex().to_string()
-    })
-}
+/// Fingerprint of the sources that renders are made by.
+const RENDERER: &str = env!("PATHBLEND_RENDERER");
 
 fn failed(name: &str, error: impl std::fmt::Display) -> BlendError {
     BlendError::Load { name: name.to_owned(), message: error.to_string() }
@@ -238,7 +231,7 @@ fn failed(name: &str, error: impl std::fmt::Display) -> BlendError {
 impl Task<'_> {
     fn path(&self, cache: &Path) -> PathBuf {
         let key = json!({
-            "software": if REFERENCE_SEEDS.contains(&self.seed) { env!("CARGO_PKG_VERSION") } else { program() },
+            "software": if REFERENCE_SEEDS.contains(&self.seed) { env!("CARGO_PKG_VERSION") } else { RENDERER },
             "scene": self.scene.hash,
             "size": self.scene.camera.size,
             "max_depth": self.scene.max_depth,

@@ -54,7 +54,7 @@ pub enum BlendError {
         expected: String,
     },
     /// The model was not made for blending images.
-    #[error("model: setting `features` is {found}; expected one of \"mean\", \"both\", \"difference\"")]
+    #[error("model: setting `features` is {found}; expected one of \"mean\", \"both\", \"difference\", \"noise\"")]
     FeatureSet {
         /// What the model says.
         found: String,

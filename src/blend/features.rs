@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
+use super::noise;
 use super::planes::Planes;
 
 /// Pixels whose features are computed together: few enough for all channels to stay in the cache, enough for each plane to
@@ -29,6 +30,8 @@ pub enum FeatureSet {
     /// As [`FeatureSet::Mean`], and `difference` = (A − B) / (A + B) of the two images' summed luminances, in [−1, 1]: it
     /// shows a firefly in either image, but a model that uses it darkens noisy pixels on average.
     Difference,
+    /// As [`FeatureSet::Mean`], and `noise`: b's share of the noise around the pixel, in [0, 1], as the two images show it.
+    Noise,
 }
 
 /// One number per pixel.
@@ -39,6 +42,7 @@ enum Channel {
     A(usize),
     B(usize),
     Difference,
+    Noise,
 }
 
 impl FeatureSet {
@@ -48,6 +52,7 @@ impl FeatureSet {
             Self::Mean => mean.collect(),
             Self::Both => (0..classes).map(Channel::A).chain((0..classes).map(Channel::B)).collect(),
             Self::Difference => mean.chain([Channel::Difference]).collect(),
+            Self::Noise => mean.chain([Channel::Noise]).collect(),
         }
     }
 }
@@ -59,6 +64,7 @@ impl Channel {
             Self::A(k) => format!("a.{}", planes.classes[k].name),
             Self::B(k) => format!("b.{}", planes.classes[k].name),
             Self::Difference => "difference".to_owned(),
+            Self::Noise => "noise".to_owned(),
         }
     }
 }
@@ -71,6 +77,8 @@ pub(super) struct Features<'a> {
     names: Vec<String>,
     /// For each class the channels that its plane in image a, and that in image b, go into.
     outputs: Vec<[Option<usize>; 2]>,
+    /// The channel [`Channel::Noise`] per pixel; empty where it is not wanted.
+    noise: Vec<f32>,
 }
 
 /// Features of up to [`TILE`] neighbouring pixels.
@@ -103,10 +111,11 @@ impl<'a> Features<'a> {
                 Channel::Mean(k) => outputs[k] = [Some(c); 2],
                 Channel::A(k) => outputs[k][0] = Some(c),
                 Channel::B(k) => outputs[k][1] = Some(c),
-                Channel::Difference => {}
+                Channel::Difference | Channel::Noise => {}
             }
         }
-        Self { planes, channels, names, outputs }
+        let noise = if channels.contains(&Channel::Noise) { noise::share(planes) } else { Vec::new() };
+        Self { planes, channels, names, outputs, noise }
     }
 
     /// Names of the channels, in order.
@@ -142,6 +151,7 @@ impl<'a> Features<'a> {
                 Channel::Mean(_) => scale(out, &both),
                 Channel::A(_) => scale(out, &only_a),
                 Channel::B(_) => scale(out, &only_b),
+                Channel::Noise => out.copy_from_slice(&self.noise[range.clone()]),
                 Channel::Difference => (0..count).for_each(|i| out[i] = (tile.a[i] - tile.b[i]) * both[i]),
             }
         }

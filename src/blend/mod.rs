@@ -11,6 +11,7 @@ mod error;
 mod evaluate;
 mod features;
 mod learn;
+mod noise;
 mod planes;
 mod predict;
 mod rows;

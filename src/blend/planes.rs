@@ -27,6 +27,8 @@ pub(super) struct Planes<'a> {
     pub a: Cow<'a, [f32]>,
     pub b: Cow<'a, [f32]>,
     pub pixels: usize,
+    /// Pixels per row.
+    pub width: usize,
 }
 
 impl<'a> Planes<'a> {
@@ -46,6 +48,7 @@ impl<'a> Planes<'a> {
             a: colours(a.image),
             b: colours(b.image),
             pixels: a.image.width() * a.image.height(),
+            width: a.image.width(),
         })
     }
 }
