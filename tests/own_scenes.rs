@@ -161,7 +161,7 @@ fn methods_agree_class_by_class_on_every_scene() {
         };
         let bdpt = classes(&runs(Method::Bdpt, 160));
         for (method, passes, granted) in
-            [(Method::Path, 1000, 0.0), (Method::Mmlt, 300, 0.0), (Method::Sppm, 200, 0.03)]
+            [(Method::Path, 500, 0.0), (Method::Mmlt, 300, 0.0), (Method::Sppm, 200, 0.03)]
         {
             let other = classes(&runs(method, passes));
             let mut top = (String::new(), 0.0, 0.0);
