@@ -163,6 +163,16 @@ fn refinement_helps_where_growing_overfits() {
 }
 
 #[test]
+fn shrinkage_draws_every_answer_towards_one_half() {
+    let rows = sparse(2000, 5, 3);
+    let predict = |shrinkage| train(&rows, &Settings { shrinkage, ..Settings::default() }).unwrap().predict(&rows);
+    for (full, drawn) in predict(0.0).into_iter().zip(predict(0.25)) {
+        assert!((drawn - (0.5 + 0.75 * (full - 0.5))).abs() < 2e-4, "{full} {drawn}");
+    }
+    assert!(predict(1.0).into_iter().all(|w| w == 0.5));
+}
+
+#[test]
 fn wrong_settings_and_empty_tables_are_errors() {
     let rows = sparse(10, 2, 1);
     for settings in [

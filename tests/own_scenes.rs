@@ -10,7 +10,8 @@ use pathblend::scene::Scene;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-const SCENES: [&str; 10] = ["box", "spheres", "plates", "door", "torus", "ring", "lamp", "gallery", "pool", "bokeh"];
+const SCENES: [&str; 11] =
+    ["box", "spheres", "plates", "door", "torus", "ring", "lamp", "gallery", "pool", "bokeh", "porch"];
 const METHODS: [Method; 4] = [Method::Path, Method::Bdpt, Method::Sppm, Method::Mmlt];
 /// Side of the references, and of the tiles that they are compared in.
 const SIDE: usize = 64;
@@ -160,8 +161,7 @@ fn methods_agree_class_by_class_on_every_scene() {
             names.into_iter().map(|name| (name.clone(), class(&name))).collect::<BTreeMap<String, (f64, f64)>>()
         };
         let bdpt = classes(&runs(Method::Bdpt, 160));
-        for (method, passes, granted) in
-            [(Method::Path, 500, 0.0), (Method::Mmlt, 300, 0.0), (Method::Sppm, 200, 0.03)]
+        for (method, passes, granted) in [(Method::Path, 500, 0.0), (Method::Mmlt, 300, 0.0), (Method::Sppm, 200, 0.03)]
         {
             let other = classes(&runs(method, passes));
             let mut top = (String::new(), 0.0, 0.0);

@@ -4,7 +4,7 @@
     pip install mitsuba==3.9.1 numpy
     python3 tests/reference/make.py [SCENE ...] [--quick]
 
-For each scene (all ten by default) it writes beside itself
+For each scene (all by default) it writes beside itself
     SCENE.exr       mean of 16 independent batches, half float, 64x64, linear RGB
     SCENE_var.exr   variance of that mean per pixel and channel, single float
 and prints a row of the README's table. --quick renders a 64th of the samples.
@@ -32,6 +32,7 @@ SPP = {
     "gallery": 2048,
     "pool": 8192,
     "bokeh": 4096,
+    "porch": 2048,
 }
 
 
