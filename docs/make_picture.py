@@ -24,8 +24,8 @@ with tempfile.TemporaryDirectory() as folder:
         return subprocess.run([PROGRAM, *map(str, arguments)], check=True, capture_output=True, text=True).stdout
 
     run("auto", FILE, "--time", "30s", "--keep", "-o", folder / "x.exr")
-    run("render", FILE, "-i", "path", "--time", "240s", "-o", folder / "r.exr", "--png", folder / "r.png")
-    names = {"x_bdpt": "bdpt, 15 s", "x_sppm": "sppm, 15 s", "x_weight": "weights", "x": "blend", "r": "path, 240 s"}
+    run("render", FILE, "-i", "path", "--time", "90s", "-o", folder / "r.exr", "--png", folder / "r.png")
+    names = {"x_bdpt": "bdpt, 15 s", "x_sppm": "sppm, 15 s", "x_weight": "weights", "x": "blend", "r": "path, 90 s"}
     pictures = []
     for name, label in names.items():
         picture = Image.open(folder / f"{name}.png").convert("RGB")

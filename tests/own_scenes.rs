@@ -141,7 +141,7 @@ fn the_number_of_threads_does_not_show() {
 }
 
 /// All classes that carry a thousandth of the light, all scenes, all methods: prints the table that it checks. SPPM is
-/// granted the bias of its radius, a part of each class. Takes some ten minutes.
+/// granted the bias of its radius, a part of each class. Takes some five minutes.
 #[test]
 #[ignore = "long: cargo test --release --test own_scenes -- --ignored --nocapture"]
 fn methods_agree_class_by_class_on_every_scene() {
@@ -160,8 +160,8 @@ fn methods_agree_class_by_class_on_every_scene() {
             let names: std::collections::BTreeSet<String> = runs.iter().flat_map(|run| run.keys().cloned()).collect();
             names.into_iter().map(|name| (name.clone(), class(&name))).collect::<BTreeMap<String, (f64, f64)>>()
         };
-        let bdpt = classes(&runs(Method::Bdpt, 160));
-        for (method, passes, granted) in [(Method::Path, 500, 0.0), (Method::Mmlt, 300, 0.0), (Method::Sppm, 200, 0.03)]
+        let bdpt = classes(&runs(Method::Bdpt, 80));
+        for (method, passes, granted) in [(Method::Path, 250, 0.0), (Method::Mmlt, 150, 0.0), (Method::Sppm, 100, 0.03)]
         {
             let other = classes(&runs(method, passes));
             let mut top = (String::new(), 0.0, 0.0);
