@@ -33,9 +33,10 @@ fn fails(command: &mut Command, folder: &Path, parts: &[&str]) {
 fn render(folder: &Path, method: &str, out: &str, more: &[&str]) -> Value {
     let output = pathblend()
         .current_dir(folder)
-        .args(["render", "-i", method, "--size", "24x16", "--json", "-o", out])
+        .args(["render", "-i", method, "--json", "-o", out])
         .args(more)
-        .arg(if more.contains(&"bokeh") { scene("bokeh") } else { scene("spheres") })
+        .args(if more.contains(&"--size") { &[][..] } else { &["--size", "24x16"] })
+        .arg(scene("spheres"))
         .output()
         .unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
