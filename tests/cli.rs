@@ -128,7 +128,7 @@ fn blend_names_the_file_that_does_not_fit() {
     let bytes = fs::read(path.join("b.exr")).unwrap();
     fs::write(path.join("cut.exr"), &bytes[..bytes.len() / 2]).unwrap();
     fails(&mut blend(&["a.exr", "cut.exr"]), path, &["cut.exr", "truncated"]);
-    fs::write(path.join("model.json"), r#"{"format": "pathblend forest", "version": 99}"#).unwrap();
+    fs::write(path.join("model.json"), r#"{"format": "pathblend-forest", "version": 99}"#).unwrap();
     fails(&mut blend(&["a.exr", "b.exr", "--model", "model.json"]), path, &["model.json", "version"]);
     fails(&mut blend(&["a.exr", "missing.exr"]), path, &["missing.exr"]);
     render(path, "sppm", "short.exr", &["--passes", "1", "--max-depth", "2"]);

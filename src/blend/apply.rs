@@ -36,8 +36,9 @@ pub fn weight_map(model: &Model, a: Input<'_>, b: Input<'_>) -> Result<Array2<f3
 /// [`BlendError::FeatureSet`] for a model not made by this room.
 pub fn apply(model: &Model, a: Input<'_>, b: Input<'_>) -> Result<Image, BlendError> {
     let (a, b) = in_order(model, a, b)?;
-    same_scene(a, b)?;
+    // Sizes first: a scene's fingerprint says less to a user than the two sizes do.
     let planes = Planes::of(a, b)?;
+    same_scene(a, b)?;
     let (weights, nonfinite) = safe_weights(model, &planes)?;
     let mut image = Image::new(a.image.width(), a.image.height());
     let mut colour = mix_colours(&weights, &planes.a, &planes.b);
