@@ -3,7 +3,7 @@
 
 use ndarray::{Array2, Array3};
 use pathblend::blend::{
-    BlendError, FeatureSet, Input, Objective, Options, Pair, RowSettings, append, apply, leave_one_out, train,
+    BlendError, Classes, FeatureSet, Input, Objective, Options, Pair, RowSettings, append, apply, leave_one_out, train,
     weight_map,
 };
 use pathblend::forest::{Model, Rows, Settings};
@@ -77,7 +77,7 @@ fn blending_an_image_with_itself_is_the_identity() {
     let pair = pair(50, 31, 5);
     let mut twin = pair.a.clone();
     twin.manifest.insert(INTEGRATOR_KEY.into(), json!("sppm"));
-    let out = apply(&mean(), Input::new("a", &pair.a), Input::new("b", &twin)).unwrap();
+    let out = apply(&mean(), Input::new("a", &pair.a), Input::new("b", &twin), Classes::Blend).unwrap();
     assert_eq!(out.colour, pair.a.colour);
     for name in CLASSES {
         assert_eq!(out.layers[name], pair.a.layers[name]);
@@ -90,7 +90,7 @@ fn weights_are_shares_and_layers_still_add_up() {
     for set in [FeatureSet::Mean, FeatureSet::Both, FeatureSet::Difference] {
         let model = learn(set, Objective::default());
         let [a, b, _] = inputs(&pair);
-        let out = apply(&model, a, b).unwrap();
+        let out = apply(&model, a, b, Classes::Blend).unwrap();
         let Layer::Luminance(weights) = &out.layers["weight_mmlt"] else { panic!("no luminance") };
         assert_eq!(*weights, weight_map(&model, a, b).unwrap());
         assert!(weights.iter().all(|w| (0.0..=1.0).contains(w)));
@@ -118,7 +118,7 @@ fn a_learnt_blend_recovers_most_of_what_can_be_gained() {
     let model = mean();
     let pair = pair(300, 200, 40);
     let [a, b, _] = inputs(&pair);
-    let blend = mse(&apply(&model, a, b).unwrap(), &pair.reference);
+    let blend = mse(&apply(&model, a, b, Classes::Blend).unwrap(), &pair.reference);
     let mut average = pair.a.clone();
     average.colour = (&pair.a.colour + &pair.b.colour) / 2.0;
     let average = mse(&average, &pair.reference);
@@ -211,7 +211,7 @@ fn leave_one_out_reports_what_it_promises() {
 fn misfits_are_named() {
     let (model, good, small) = (mean(), pair(20, 10, 1), pair(10, 20, 1));
     let a = Input::new("a.exr", &good.a);
-    let refused = |b: &Image| apply(&model, a, Input::new("b.exr", b)).unwrap_err().to_string();
+    let refused = |b: &Image| apply(&model, a, Input::new("b.exr", b), Classes::Blend).unwrap_err().to_string();
     let message = refused(&small.b);
     assert!(message.contains("b.exr: 10 × 20") && message.contains("20 × 10 as in a.exr"), "{message}");
     let edited = |edit: &dyn Fn(&mut Image)| {
@@ -231,12 +231,12 @@ fn misfits_are_named() {
     scened.a.manifest.insert(SCENE_KEY.into(), json!("1"));
     scened.b.manifest.insert(SCENE_KEY.into(), json!("2"));
     let [a, b, _] = inputs(&scened);
-    let message = apply(&model, a, b).unwrap_err().to_string();
+    let message = apply(&model, a, b, Classes::Blend).unwrap_err().to_string();
     assert!(message.contains("b.exr: scene hash `2`"), "{message}");
     let mut other = model.clone();
     other.settings.insert("features".into(), json!("magic"));
     let [a, b, reference] = inputs(&good);
-    assert!(matches!(apply(&other, a, b), Err(BlendError::FeatureSet { .. })));
+    assert!(matches!(apply(&other, a, b, Classes::Blend), Err(BlendError::FeatureSet { .. })));
     let mut rows = Rows::new();
     let small = Input::new("small.exr", &small.reference);
     assert!(append(&mut rows, a, b, small, 0, &RowSettings::default()).is_err());
@@ -248,7 +248,7 @@ fn misfits_are_named() {
 fn the_order_of_named_images_does_not_matter() {
     let (model, pair) = (mean(), pair(40, 30, 2));
     let [a, b, _] = inputs(&pair);
-    assert_eq!(apply(&model, a, b).unwrap(), apply(&model, b, a).unwrap());
+    assert_eq!(apply(&model, a, b, Classes::Blend).unwrap(), apply(&model, b, a, Classes::Blend).unwrap());
 }
 
 #[test]
@@ -257,26 +257,27 @@ fn pixels_without_features_and_broken_pixels_are_taken_care_of() {
     for image in [&mut pair.a, &mut pair.b] {
         for name in CLASSES {
             let Some(Layer::Luminance(v)) = image.layers.get_mut(name) else { panic!("no {name}") };
-            v[(0, 0)] = 0.0;
             v[(0, 1)] = f32::NAN;
-            v[(0, 2)] = -1.0;
         }
+        (0..3).for_each(|c| image.colour[(0, 0, c)] = 0.0);
+        (0..3).for_each(|c| image.colour[(0, 2, c)] = -1.0);
     }
     pair.a.colour[(1, 0, 1)] = f32::NAN;
     pair.b.colour[(1, 1, 0)] = f32::INFINITY;
     pair.a.colour[(1, 2, 2)] = f32::NAN;
     pair.b.colour[(1, 2, 2)] = f32::NAN;
     let [a, b, reference] = inputs(&pair);
-    let out = apply(&model, a, b).unwrap();
+    let out = apply(&model, a, b, Classes::Blend).unwrap();
     let Layer::Luminance(weights) = &out.layers["weight_mmlt"] else { panic!("no luminance") };
-    assert_eq!([0, 1, 2].map(|x| weights[(0, x)]), [0.5; 3]);
+    assert_eq!([0, 2].map(|x| weights[(0, x)]), [0.5; 2]);
+    assert!((0.0..=1.0).contains(&weights[(0, 1)]));
     assert_eq!([0, 1].map(|x| weights[(1, x)]), [0.0, 1.0]);
     assert!(out.colour.iter().all(|v| v.is_finite()));
     assert_eq!([0, 1, 2].map(|c| out.colour[(1, 2, c)]), [0.0; 3]);
     assert_eq!(out.manifest["blend"]["nonfinite_pixels"], 3);
     let mut rows = Rows::new();
     append(&mut rows, a, b, reference, 0, &RowSettings::default()).unwrap();
-    assert_eq!(rows.len(), 40 * 30 - 6);
+    assert_eq!(rows.len(), 40 * 30 - 5);
 }
 
 #[test]
@@ -288,7 +289,7 @@ fn classes_that_the_model_or_an_image_lacks() {
     pair.b.layers.insert("path_LSSE".into(), extra.clone());
     pair.a.layers.insert("variance".into(), extra.clone());
     let [a, b, _] = inputs(&pair);
-    let out = apply(&model, a, b).unwrap();
+    let out = apply(&model, a, b, Classes::Blend).unwrap();
     assert_eq!(out.layers["path_LSSE"], extra);
     assert!(!out.layers.contains_key("variance"));
     let (Layer::Luminance(w), Layer::Luminance(v)) = (&out.layers["weight_mmlt"], &out.layers["path_LSDE"]) else {
@@ -303,7 +304,9 @@ fn classes_that_the_model_or_an_image_lacks() {
 #[test]
 fn rows_are_thinned_scaled_and_capped() {
     let mut pair = pair(100, 50, 3);
-    pair.a.colour[(7, 7, 0)] = 1e6;
+    let Some(Layer::Luminance(class)) = pair.a.layers.get_mut(CLASSES[0]) else { panic!("no luminance") };
+    class[(7, 7)] += 1e6;
+    (0..3).for_each(|c| pair.a.colour[(7, 7, c)] += 1e6);
     let [a, b, reference] = inputs(&pair);
     let make = |settings: &RowSettings| {
         let mut rows = Rows::new();

@@ -43,6 +43,15 @@ fn predictions_stay_within_the_targets() {
 }
 
 #[test]
+fn a_forest_asks_for_the_heaviest_features_only() {
+    let rows = sparse(3000, 20, 1);
+    let used = |max_features: usize| train(&rows, &Settings { max_features, ..exact() }).unwrap().used_features();
+    assert!(used(20).len() > 15);
+    assert_eq!(used(2), [0, 1], "those that every row has");
+    assert!(matches!(train(&rows, &Settings { max_features: 0, ..exact() }), Err(ForestError::Setting { .. })));
+}
+
+#[test]
 fn targets_outside_the_unit_interval_are_averaged_before_they_are_clamped() {
     let mut rows = Rows::new();
     let x = rows.feature("x").unwrap();

@@ -7,7 +7,7 @@ use pathblend::image::{Image, Layer, luminance};
 use pathblend::integrators::{Budget, Method, Settings, render};
 use pathblend::load;
 use pathblend::scene::Scene;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 const SCENES: [&str; 11] =
@@ -140,59 +140,90 @@ fn the_number_of_threads_does_not_show() {
     }
 }
 
-/// All classes that carry a thousandth of the light, all scenes, all methods: prints the table that it checks. SPPM is
-/// granted the bias of its radius, a part of each class. Takes some five minutes.
+/// Mean and standard error of each class's light.
+type Classes = BTreeMap<String, (f64, f64)>;
+
+fn classes(scene: &Scene, method: Method, passes: u64, runs: u64) -> Classes {
+    let runs: Vec<BTreeMap<String, f64>> = (0..runs).map(|seed| layers(&image(scene, method, seed, passes))).collect();
+    let class = |name: &str| moments(runs.iter().map(|run| run.get(name).copied().unwrap_or(0.0)));
+    let names: BTreeSet<&String> = runs.iter().flat_map(|run| run.keys()).collect();
+    names.into_iter().map(|name| (name.clone(), class(name))).collect()
+}
+
+fn class(of: &Classes, name: &str) -> (f64, f64) {
+    of.get(name).copied().unwrap_or((0.0, 0.0))
+}
+
+/// How far classes are from where they should be, in standard errors.
+#[derive(Default)]
+struct Deviations {
+    count: usize,
+    /// The worst class: its name, its standard errors, its relative deviation.
+    worst: (String, f64, f64),
+}
+
+impl Deviations {
+    fn add(&mut self, class: &str, z: f64, relative: f64) {
+        self.count += 1;
+        if z > self.worst.1 {
+            self.worst = (class.to_owned(), z, relative);
+        }
+    }
+
+    fn print(&self, scene: &str, method: &str, ratio: f64) {
+        let (class, z, relative) = &self.worst;
+        println!(
+            "| {scene} | {method} | {} | {class} | {z:.1} | {:+.2} % | {ratio:.4} |",
+            self.count,
+            100.0 * relative
+        );
+    }
+}
+
+/// All classes that carry a thousandth of the light, all scenes, all methods: prints the table that it checks. Takes some
+/// twenty minutes.
+///
+/// Of `mmlt` those classes are judged of which bdpt knows the light to a percent. The others have one technique only and
+/// hardly ever find light by it; a chain that comes upon one stays for longer than these runs last, so that most runs
+/// miss it and their spread says nothing of that.
+///
+/// Of `sppm` it is judged how the bias falls: ten times the passes shrink the radius to 10^(−1/6) of it, and the bias at
+/// least in proportion, where it comes from borders.
 #[test]
 #[ignore = "long: cargo test --release --test own_scenes -- --ignored --nocapture"]
 fn methods_agree_class_by_class_on_every_scene() {
-    const RUNS: u64 = 16;
-    let mut worst = Vec::new();
-    println!(
-        "| scene | method | classes | worst | z | bias beyond noise | mean ratio |\n|---|---|---|---|---|---|---|"
-    );
+    let mut all = Vec::new();
+    println!("| scene | method | classes | worst | z | deviation | mean ratio |\n|---|---|---|---|---|---|---|");
     for name in SCENES {
         let scene = scene(name, [48, 48]);
-        let runs = |method: Method, passes: u64| -> Vec<BTreeMap<String, f64>> {
-            (0..RUNS).map(|seed| layers(&image(&scene, method, seed, passes))).collect()
-        };
-        let classes = |runs: &[BTreeMap<String, f64>]| {
-            let class = |name: &str| moments(runs.iter().map(|run| run.get(name).copied().unwrap_or(0.0)));
-            let names: std::collections::BTreeSet<String> = runs.iter().flat_map(|run| run.keys().cloned()).collect();
-            names.into_iter().map(|name| (name.clone(), class(&name))).collect::<BTreeMap<String, (f64, f64)>>()
-        };
-        let bdpt = classes(&runs(Method::Bdpt, 80));
-        for (method, passes, granted) in [(Method::Path, 250, 0.0), (Method::Mmlt, 150, 0.0), (Method::Sppm, 100, 0.03)]
-        {
-            let other = classes(&runs(method, passes));
-            let mut top = (String::new(), 0.0, 0.0);
-            let mut count = 0;
-            for (class, (a, error_a)) in &bdpt {
-                let (b, error_b) = other.get(class).copied().unwrap_or((0.0, 0.0));
-                // What only a point light makes, no walk from the camera finds.
-                let blind = name == "bokeh" && method == Method::Path;
-                if *a < 1e-3 * bdpt["all"].0 || (blind && (class.contains("LS") || class == "all")) {
-                    continue;
-                }
-                count += 1;
-                let excess = ((a - b).abs() - granted * a).max(0.0);
-                let z = excess / error_a.hypot(error_b);
-                if z > top.1 {
-                    top = (class.clone(), z, (b - a) / a);
-                }
+        let bdpt = classes(&scene, Method::Bdpt, 80, 16);
+        let path = classes(&scene, Method::Path, 250, 16);
+        let mmlt = classes(&scene, Method::Mmlt, 150, 16);
+        let (few, many) = (classes(&scene, Method::Sppm, 100, 16), classes(&scene, Method::Sppm, 1000, 8));
+        let mut deviations: [Deviations; 3] = Default::default();
+        for (word, &(truth, error)) in bdpt.iter().filter(|(_, class)| class.0 >= 1e-3 * bdpt["all"].0) {
+            // What only a point light makes, no walk from the camera finds.
+            if name != "bokeh" || !(word.contains("LS") || word == "all") {
+                let (mean, own) = class(&path, word);
+                deviations[0].add(word, (mean - truth).abs() / error.hypot(own), mean / truth - 1.0);
             }
-            println!(
-                "| {name} | {} | {count} | {} | {:.1} | {:+.2} % | {:.4} |",
-                method.name(),
-                top.0,
-                top.1,
-                100.0 * top.2,
-                other["all"].0 / bdpt["all"].0
-            );
-            worst.push((name, method, top));
+            if error < 0.01 * truth {
+                let (mean, own) = class(&mmlt, word);
+                deviations[1].add(word, (mean - truth).abs() / error.hypot(own), mean / truth - 1.0);
+            }
+            let ((few, error_few), (many, error_many)) = (class(&few, word), class(&many, word));
+            let excess = (many - truth).abs() - 0.8 * (few - truth).abs();
+            deviations[2].add(word, excess / error.hypot(error_many).hypot(0.8 * error_few), many / truth - 1.0);
+        }
+        for ((method, light), deviations) in
+            [("path", path), ("mmlt", mmlt), ("sppm", many)].into_iter().zip(deviations)
+        {
+            deviations.print(name, method, light["all"].0 / bdpt["all"].0);
+            all.push((name, method, deviations.worst));
         }
     }
-    for (name, method, (class, z, _)) in worst {
-        assert!(z < 9.0, "{name}, {method:?}: class {class} is {z:.1} standard errors from bdpt");
+    for (name, method, (class, z, _)) in all {
+        assert!(z < 9.0, "{name}, {method}: class {class} is {z:.1} standard errors off");
     }
 }
 

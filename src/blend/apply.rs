@@ -4,6 +4,7 @@ use ndarray::{Array2, Array3};
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
+use super::features::TILE;
 use super::planes::{Class, Planes};
 use super::predict::{UNKNOWN, feature_set, forest_weights, mix, mix_colours, mix_planes};
 use super::{BlendError, Input};
@@ -11,7 +12,7 @@ use crate::forest::Model;
 use crate::image::{DEPTH_KEY, INTEGRATOR_KEY, Image, Layer, SCENE_KEY};
 
 /// The weight of image a at every pixel, height × width, in [0, 1]: the forest's prediction; 0.5 where a pixel has no
-/// light in any class of either image; all weight on the other image where one's colour is not finite.
+/// light in either image; all weight on the other image where one's colour is not finite.
 ///
 /// # Errors
 /// As [`apply`], but neither order nor manifests are looked at.
@@ -21,10 +22,21 @@ pub fn weight_map(model: &Model, a: Input<'_>, b: Input<'_>) -> Result<Array2<f3
     array2(weights, a.image)
 }
 
-/// Blends two images of one scene by a model: colour w A + (1 − w) B per pixel, path layers likewise, so that they still
-/// add up to the image's luminance, and the weights as luminance layer `weight_NAME`, NAME being the model's first
-/// integrator. A path layer that only one image has counts as black in the other. Other layers are left out: what a blend
-/// of, say, two variances means is not for this function to guess.
+/// What becomes of the path layers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Classes {
+    /// They are left out of the blend, which then takes no longer where there are hundreds.
+    Drop,
+    /// They are blended as the image is.
+    Blend,
+}
+
+/// Blends two images of one scene by a model: colour w A + (1 − w) B per pixel, and the weights as luminance layer
+/// `weight_NAME`, NAME being the model's first integrator.
+///
+/// Path layers are blended likewise if `classes` says so, and then still add up to the image's luminance; a path layer
+/// that only one image has counts as black in the other. Other layers are left out: what a blend of, say, two variances
+/// means is not for this function to guess.
 ///
 /// Images whose manifests name their integrators may come in either order. The result's manifest says, under `blend`,
 /// what was blended by which model, the mean weight, and how many pixels had no features or no finite colour (black where
@@ -34,7 +46,7 @@ pub fn weight_map(model: &Model, a: Input<'_>, b: Input<'_>) -> Result<Array2<f3
 /// [`BlendError::Size`], [`BlendError::NoLayers`], [`BlendError::LayerShape`] for images that do not fit;
 /// [`BlendError::Content`] if their manifests name other integrators than the model, or different scenes;
 /// [`BlendError::FeatureSet`] for a model not made by this room.
-pub fn apply(model: &Model, a: Input<'_>, b: Input<'_>) -> Result<Image, BlendError> {
+pub fn apply(model: &Model, a: Input<'_>, b: Input<'_>, classes: Classes) -> Result<Image, BlendError> {
     let (a, b) = in_order(model, a, b)?;
     // Sizes first: a scene's fingerprint says less to a user than the two sizes do.
     let planes = Planes::of(a, b)?;
@@ -46,9 +58,12 @@ pub fn apply(model: &Model, a: Input<'_>, b: Input<'_>) -> Result<Image, BlendEr
         colour[3 * pixel..3 * pixel + 3].fill(0.0);
     }
     image.colour = array3(colour, a.image)?;
-    let classes = planes.classes.par_iter().map(|c| Ok((c.name.to_owned(), class_layer(c, &weights, a, b)?)));
-    image.layers = classes.collect::<Result<_, BlendError>>()?;
-    let mean = weights.iter().map(|&w| f64::from(w)).sum::<f64>() / weights.len().max(1) as f64;
+    if classes == Classes::Blend {
+        let layers = planes.classes.par_iter().map(|c| Ok((c.name.to_owned(), class_layer(c, &weights, a, b)?)));
+        image.layers = layers.collect::<Result<_, BlendError>>()?;
+    }
+    let sums: Vec<f64> = weights.par_chunks(TILE).map(|tile| tile.iter().map(|&w| f64::from(w)).sum()).collect();
+    let mean = sums.iter().sum::<f64>() / weights.len().max(1) as f64;
     image.layers.insert(weight_layer(&model.integrators[0]), Layer::Luminance(array2(weights, a.image)?));
     if let Some(scene) = a.image.manifest.get(SCENE_KEY) {
         image.manifest.insert(SCENE_KEY.into(), scene.clone());
@@ -76,6 +91,7 @@ pub fn weight_layer(integrator: &str) -> String {
 }
 
 /// Pixels without a finite colour.
+#[derive(Default)]
 struct Nonfinite {
     /// In one image or both.
     count: usize,
@@ -83,25 +99,42 @@ struct Nonfinite {
     neither: Vec<usize>,
 }
 
+impl Nonfinite {
+    fn join(mut self, other: Self) -> Self {
+        self.count += other.count;
+        self.neither.extend(other.neither);
+        self
+    }
+}
+
 fn safe_weights(model: &Model, planes: &Planes<'_>) -> Result<(Vec<f32>, Nonfinite), BlendError> {
     let mut weights = forest_weights(&model.forest, feature_set(model)?, planes);
-    let mut nonfinite = Nonfinite { count: 0, neither: Vec::new() };
+    let tiles = weights.par_chunks_mut(TILE).enumerate();
+    let nonfinite = tiles.map(|(tile, weights)| decide_nonfinite(planes, tile * TILE, weights));
+    let nonfinite = nonfinite.reduce(Nonfinite::default, Nonfinite::join);
+    Ok((weights, nonfinite))
+}
+
+/// Puts all weight on the other image where one's colour is not finite; `weights` are those from pixel `first` on.
+fn decide_nonfinite(planes: &Planes<'_>, first: usize, weights: &mut [f32]) -> Nonfinite {
+    let mut nonfinite = Nonfinite::default();
+    let pixels = planes.a[3 * first..].chunks_exact(3).zip(planes.b[3 * first..].chunks_exact(3));
     // Summing says of a whole pixel in one test whether it is finite: colours near the largest number that overflow are
     // as useless as infinities.
-    let finite = |plane: &[f32], i: usize| (plane[3 * i] + plane[3 * i + 1] + plane[3 * i + 2]).is_finite();
-    for (i, w) in weights.iter_mut().enumerate() {
-        *w = match (finite(&planes.a, i), finite(&planes.b, i)) {
+    let finite = |colour: &[f32]| (colour[0] + colour[1] + colour[2]).is_finite();
+    for ((i, w), (a, b)) in weights.iter_mut().enumerate().zip(pixels) {
+        *w = match (finite(a), finite(b)) {
             (true, true) => continue,
             (true, false) => 1.0,
             (false, true) => 0.0,
             (false, false) => {
-                nonfinite.neither.push(i);
+                nonfinite.neither.push(first + i);
                 UNKNOWN
             }
         };
         nonfinite.count += 1;
     }
-    Ok((weights, nonfinite))
+    nonfinite
 }
 
 /// One path class of the blend; in colour where both images have it so.

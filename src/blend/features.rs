@@ -1,11 +1,13 @@
-//! Path features of pixels: class luminances over their sum (Otsu thesis, eq. 5.5).
+//! Path features of pixels: class luminances over the pixel's luminance, which is their sum (Otsu thesis, eq. 5.5).
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
 use super::noise;
 use super::planes::Planes;
+use crate::image::luminance;
 
 /// Pixels whose features are computed together: few enough for all channels to stay in the cache, enough for each plane to
 /// be read in runs of a page.
@@ -27,7 +29,7 @@ pub enum FeatureSet {
     Mean,
     /// Of each class, its share in image a and its share in image b, as `a.path_*` and `b.path_*`.
     Both,
-    /// As [`FeatureSet::Mean`], and `difference` = (A − B) / (A + B) of the two images' summed luminances, in [−1, 1]: it
+    /// As [`FeatureSet::Mean`], and `difference` = (A − B) / (A + B) of the two images' luminances, in [−1, 1]: it
     /// shows a firefly in either image, but a model that uses it darkens noisy pixels on average.
     Difference,
     /// As [`FeatureSet::Mean`], and `noise`: b's share of the noise around the pixel, in [0, 1], as the two images show it.
@@ -70,13 +72,14 @@ impl Channel {
 }
 
 /// Computes features of two images, tile by tile.
+///
+/// Classes add up to the image, so the colour's luminance stands for their sum, and only the planes of wanted classes are
+/// read: an image may have hundreds, of which a model asks for a few dozen.
 #[derive(Debug)]
 pub(super) struct Features<'a> {
     planes: &'a Planes<'a>,
     channels: Vec<Channel>,
     names: Vec<String>,
-    /// For each class the channels that its plane in image a, and that in image b, go into.
-    outputs: Vec<[Option<usize>; 2]>,
     /// The channel [`Channel::Noise`] per pixel; empty where it is not wanted.
     noise: Vec<f32>,
 }
@@ -86,13 +89,13 @@ pub(super) struct Features<'a> {
 pub(super) struct Tile {
     /// Channel c of pixel i stands at `values[c * STRIDE + i]`.
     pub values: Vec<f32>,
-    /// Summed class luminance of each pixel in images a and b.
+    /// Luminance of each pixel in images a and b.
     a: [f32; TILE],
     b: [f32; TILE],
 }
 
 impl Tile {
-    /// Whether a pixel has any features: some light in some class.
+    /// Whether a pixel has any features: some light in one of the images.
     #[inline]
     pub(super) fn known(&self, i: usize) -> bool {
         self.a[i] + self.b[i] > 0.0
@@ -105,17 +108,8 @@ impl<'a> Features<'a> {
         let channels = set.channels(planes.classes.len()).into_iter().map(|c| (c, c.name(planes)));
         let is_wanted = |name: &str| wanted.is_none_or(|w| w.contains(&name));
         let (channels, names): (Vec<Channel>, _) = channels.filter(|(_, name)| is_wanted(name)).unzip();
-        let mut outputs = vec![[None; 2]; planes.classes.len()];
-        for (c, &channel) in channels.iter().enumerate() {
-            match channel {
-                Channel::Mean(k) => outputs[k] = [Some(c); 2],
-                Channel::A(k) => outputs[k][0] = Some(c),
-                Channel::B(k) => outputs[k][1] = Some(c),
-                Channel::Difference | Channel::Noise => {}
-            }
-        }
         let noise = if channels.contains(&Channel::Noise) { noise::share(planes) } else { Vec::new() };
-        Self { planes, channels, names, outputs, noise }
+        Self { planes, channels, names, noise }
     }
 
     /// Names of the channels, in order.
@@ -129,28 +123,27 @@ impl<'a> Features<'a> {
     }
 
     /// Computes the features of the pixels in `range`, at most [`TILE`] of them.
-    ///
-    /// Each plane is read once, for the sums and for its channel together: reading is most of the work.
     pub(super) fn fill(&self, range: Range<usize>, tile: &mut Tile) {
         let count = range.len();
-        tile.a = [0.0; TILE];
-        tile.b = [0.0; TILE];
-        for (class, &[to_a, to_b]) in self.planes.classes.iter().zip(&self.outputs) {
-            let mut put = |plane: Option<&[f32]>, sums: &mut [f32; TILE], to: Option<usize>, start_afresh: bool| {
-                let out = to.map(|c| &mut tile.values[c * STRIDE..c * STRIDE + count]);
-                gather(plane.map(|p| &p[range.clone()]), &mut sums[..count], out, start_afresh);
-            };
-            put(class.a.as_deref(), &mut tile.a, to_a, true);
-            put(class.b.as_deref(), &mut tile.b, to_b, to_a != to_b);
-        }
+        let sums = |plane: &[f32], sums: &mut [f32; TILE]| {
+            let colours = plane[3 * range.start..3 * range.end].chunks_exact(3);
+            sums.iter_mut().zip(colours).for_each(|(sum, c)| *sum = light(luminance([c[0], c[1], c[2]])));
+        };
+        sums(&self.planes.a, &mut tile.a);
+        sums(&self.planes.b, &mut tile.b);
         let both: [f32; TILE] = std::array::from_fn(|i| reciprocal(tile.a[i] + tile.b[i]));
         let (only_a, only_b) = (tile.a.map(reciprocal), tile.b.map(reciprocal));
+        let part = |plane: &'a Option<Cow<'a, [f32]>>| plane.as_deref().map_or(&[][..], |p| &p[range.clone()]);
         for (&channel, out) in self.channels.iter().zip(tile.values.chunks_exact_mut(STRIDE)) {
             let out = &mut out[..count];
             match channel {
-                Channel::Mean(_) => scale(out, &both),
-                Channel::A(_) => scale(out, &only_a),
-                Channel::B(_) => scale(out, &only_b),
+                Channel::Mean(k) => {
+                    let class = &self.planes.classes[k];
+                    shares(part(&class.a), &both, out);
+                    add_shares(part(&class.b), &both, out);
+                }
+                Channel::A(k) => shares(part(&self.planes.classes[k].a), &only_a, out),
+                Channel::B(k) => shares(part(&self.planes.classes[k].b), &only_b, out),
                 Channel::Noise => out.copy_from_slice(&self.noise[range.clone()]),
                 Channel::Difference => (0..count).for_each(|i| out[i] = (tile.a[i] - tile.b[i]) * both[i]),
             }
@@ -158,36 +151,22 @@ impl<'a> Features<'a> {
     }
 }
 
-/// Adds the light of a plane to `sums`, and to `out` (or puts it there, to `start_afresh`).
-fn gather(plane: Option<&[f32]>, sums: &mut [f32], out: Option<&mut [f32]>, start_afresh: bool) {
-    match (plane, out) {
-        (None, Some(out)) if start_afresh => out.fill(0.0),
-        (None, _) => {}
-        (Some(plane), None) => sums.iter_mut().zip(plane).for_each(|(sum, &v)| *sum += light(v)),
-        (Some(plane), Some(out)) if start_afresh => {
-            for ((sum, out), &v) in sums.iter_mut().zip(out).zip(plane) {
-                *out = light(v);
-                *sum += *out;
-            }
-        }
-        (Some(plane), Some(out)) => {
-            for ((sum, out), &v) in sums.iter_mut().zip(out).zip(plane) {
-                let light = light(v);
-                *out += light;
-                *sum += light;
-            }
-        }
+/// A class's light times `scale`, at most 1; nothing where the image lacks the class.
+fn shares(plane: &[f32], scale: &[f32; TILE], out: &mut [f32]) {
+    if plane.is_empty() {
+        out.fill(0.0);
     }
+    out.iter_mut().zip(plane).zip(scale).for_each(|((out, &v), scale)| *out = (light(v) * scale).min(1.0));
 }
 
-fn scale(out: &mut [f32], by: &[f32; TILE]) {
-    out.iter_mut().zip(by).for_each(|(out, by)| *out *= by);
+fn add_shares(plane: &[f32], scale: &[f32; TILE], out: &mut [f32]) {
+    out.iter_mut().zip(plane).zip(scale).for_each(|((out, &v), scale)| *out = (*out + light(v) * scale).min(1.0));
 }
 
-/// A class's luminance as a feature sees it: negative lobes of a reconstruction filter, NaN and infinities are no light.
+/// Luminance as a feature sees it: negative lobes of a reconstruction filter, NaN and infinities are no light.
 #[inline]
 fn light(v: f32) -> f32 {
-    // The upper bound keeps sums of all classes finite.
+    // The upper bound keeps sums and shares finite.
     if (v > 0.0) & (v < 1e30) { v } else { 0.0 }
 }
 

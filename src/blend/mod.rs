@@ -18,7 +18,7 @@ mod rows;
 mod table;
 mod weights;
 
-pub use apply::{apply, weight_layer, weight_map};
+pub use apply::{Classes, apply, weight_layer, weight_map};
 pub use builtin::builtin;
 pub use campaign::{Findings, Recipe, RecipeScene, Reference};
 pub use error::BlendError;

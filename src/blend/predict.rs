@@ -81,11 +81,7 @@ pub(super) fn mix_planes(weights: &[f32], a: Option<&Cow<'_, [f32]>>, b: Option<
 /// w a + (1 − w) b, exactly b where both are equal, and free of what has no weight, be it NaN.
 #[inline]
 pub(super) fn mix(w: f32, a: f32, b: f32) -> f32 {
-    if w <= 0.0 {
-        b
-    } else if w >= 1.0 {
-        a
-    } else {
-        b + w * (a - b)
-    }
+    let mixed = b + w * (a - b);
+    let mixed = if w > 0.0 { mixed } else { b };
+    if w < 1.0 { mixed } else { a }
 }

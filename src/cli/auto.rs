@@ -4,7 +4,7 @@ use super::blend::model;
 use super::progress::Reporter;
 use super::render::parse_threads;
 use super::{SceneArguments, check_output, on_threads, parse_time, say};
-use crate::blend::{self, Input, weight_layer};
+use crate::blend::{self, Classes, Input, weight_layer};
 use crate::image::{Image, Layer, WriteOptions, write_false_colour, write_png};
 use crate::integrators::{Budget, Method, Settings, render};
 use crate::scene::Scene;
@@ -55,7 +55,8 @@ impl Auto {
             inputs.push((name, image));
         }
         let [(name_a, a), (name_b, b)] = &inputs[..] else { anyhow::bail!("a model blends two methods") };
-        let image = on_threads(self.threads, || blend::apply(&model, Input::new(name_a, a), Input::new(name_b, b)))??;
+        let (a, b) = (Input::new(name_a, a), Input::new(name_b, b));
+        let image = on_threads(self.threads, || blend::apply(&model, a, b, Classes::Blend))??;
         image.write(&self.output, &WriteOptions::default())?;
         let picture = self.output.with_extension("png");
         write_png(&picture, image.colour.view(), 0.0)?;

@@ -1,7 +1,7 @@
 //! `pathblend blend`.
 
 use super::{check_output, say};
-use crate::blend::{self, Input};
+use crate::blend::{self, Classes, Input};
 use crate::forest::Model;
 use crate::image::{Image, WriteOptions, write_png};
 use clap::Args;
@@ -16,9 +16,12 @@ pub(super) struct Blend {
     /// Model; default: the built-in one.
     #[arg(long)]
     model: Option<PathBuf>,
-    /// Image to write: the blend, its path layers and the weight map.
+    /// Image to write: the blend with the weight map.
     #[arg(short, long, value_name = "OUT.exr")]
     output: PathBuf,
+    /// Also blend the path layers.
+    #[arg(long)]
+    layers: bool,
     /// Also write a picture in sRGB.
     #[arg(long, value_name = "OUT.png")]
     png: Option<PathBuf>,
@@ -41,8 +44,9 @@ impl Blend {
         let model = model(self.model.as_deref())?;
         let (a, b) = (Image::read(&self.a)?, Image::read(&self.b)?);
         let (name_a, name_b) = (self.a.display().to_string(), self.b.display().to_string());
+        let classes = if self.layers { Classes::Blend } else { Classes::Drop };
         let start = std::time::Instant::now();
-        let image = blend::apply(&model, Input::new(&name_a, &a), Input::new(&name_b, &b))?;
+        let image = blend::apply(&model, Input::new(&name_a, &a), Input::new(&name_b, &b), classes)?;
         let time = start.elapsed();
         image.write(&self.output, &WriteOptions::default())?;
         if let Some(png) = &self.png {

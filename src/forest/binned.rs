@@ -24,13 +24,21 @@ pub(super) struct Binned {
 }
 
 impl Binned {
-    /// Bins all features of `rows`; cuts are chosen from the entries of the rows with positive weight.
-    pub(super) fn of(rows: &Rows) -> Self {
+    /// Bins the features of `rows`; cuts are chosen from the entries of the rows with positive weight. Of more than
+    /// `max_features` features, those with the smallest weighted mean get no cuts.
+    pub(super) fn of(rows: &Rows, max_features: usize) -> Self {
         let mut values: Vec<Vec<f32>> = vec![Vec::new(); rows.features().len()];
+        let mut sums = vec![0.0f64; values.len()];
         for row in (0..rows.len()).filter(|&r| rows.weights()[r] > 0.0) {
             let (columns, numbers) = rows.entries(row);
-            columns.iter().zip(numbers).for_each(|(&c, &v)| values[usize::from(c)].push(v));
+            for (&c, &v) in columns.iter().zip(numbers) {
+                values[usize::from(c)].push(v);
+                sums[usize::from(c)] += f64::from(rows.weights()[row]) * f64::from(v.abs());
+            }
         }
+        let mut order: Vec<usize> = (0..sums.len()).collect();
+        order.sort_by(|&x, &y| sums[y].total_cmp(&sums[x]));
+        order.into_iter().skip(max_features).for_each(|feature| values[feature].clear());
         let cuts: Vec<Vec<f32>> = values.into_par_iter().map(cuts).collect();
         let zero = cuts.iter().map(|c| bin(c, 0.0)).collect();
         let (mut ends, mut slots) = (Vec::with_capacity(rows.len()), Vec::new());
@@ -140,7 +148,7 @@ mod tests {
                 let entries: Vec<(u16, f32)> = line.iter().enumerate().map(|(c, &v)| (c as u16, f32::from(v))).collect();
                 rows.push(&entries, 0.5, 1.0, 0).unwrap();
             }
-            let binned = Binned::of(&rows);
+            let binned = Binned::of(&rows, 100);
             for (r, line) in table.iter().enumerate() {
                 for (c, &v) in line.iter().enumerate() {
                     prop_assert_eq!(binned.bin(r as u32, c as u16), bin(&binned.cuts[c], f32::from(v)));

@@ -1,49 +1,61 @@
 //! The fast path for images: several points walk down a tree side by side.
 //!
 //! One point's way down is a chain of loads that wait for each other; many at once keep the processor busy. Leaves lead to
-//! themselves, so that all points take the same number of steps and nothing needs to be decided on the way.
+//! themselves, so that all points take the same number of steps and little needs to be decided on the way.
 
-use wide::f32x8;
-
-use super::tree::{Forest, LEAF, Tree};
+use super::tree::{Forest, LEAF, Node, Tree};
 
 /// Points that walk together; a multiple of 8.
 const LANES: usize = 32;
 
+/// Steps between two looks at whether all points have arrived; each look costs about as much as a step.
+const STRETCH: usize = 3;
+
 /// A node, as it is walked: to the next node if the feature's value is below `threshold`, else to `above`.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Step {
     /// Start of the feature's plane.
     plane: u32,
     threshold: f32,
-    /// Distance from the next node to `above`.
-    skip: u32,
+    below: u32,
+}
+
+/// A tree without the nodes at which features that have no plane decide: an image has few of the classes that a model
+/// knows.
+#[derive(Debug, Default)]
+struct Walk {
+    steps: Vec<Step>,
+    /// By node, what its leaf predicts; 0 for others.
+    values: Vec<f32>,
+    depth: usize,
 }
 
 /// A forest made ready for points whose features lie in planes.
 #[derive(Debug)]
-pub(crate) struct Lanes<'a> {
-    forest: &'a Forest,
-    trees: Vec<Vec<Step>>,
-    depths: Vec<usize>,
+pub(crate) struct Lanes {
+    trees: Vec<Walk>,
 }
 
-impl<'a> Lanes<'a> {
+impl Lanes {
     /// `planes` gives each feature's plane, by column; features without one are 0. Plane p begins at p · `stride`.
-    pub(crate) fn new(forest: &'a Forest, planes: &[Option<usize>], stride: usize) -> Self {
-        let trees = forest.trees().iter().map(|t| steps(t, planes, stride)).collect();
-        Self { forest, trees, depths: forest.trees().iter().map(Tree::depth).collect() }
+    pub(crate) fn new(forest: &Forest, planes: &[Option<usize>], stride: usize) -> Self {
+        let walk = |tree: &Tree| {
+            let mut walk = Walk { steps: vec![Step::default()], values: vec![0.0], depth: 0 };
+            walk.copy(tree, 0, 0, 0, &|feature| planes[usize::from(feature)].map(|p| (p * stride) as u32));
+            walk
+        };
+        Self { trees: forest.trees().iter().map(walk).collect() }
     }
 
     /// Predictions in [0, 1] for points 0 .. `out.len()` ≤ stride; the feature in plane p of point i is
     /// `values[p * stride + i]`.
     pub(crate) fn predict(&self, values: &[f32], out: &mut [f32]) {
         out.fill(0.0);
-        for ((steps, tree), &depth) in self.trees.iter().zip(self.forest.trees()).zip(&self.depths) {
+        for tree in &self.trees {
             for (group, out) in out.chunks_mut(LANES).enumerate() {
-                let leaves = walk(steps, depth, values.get(group * LANES..).unwrap_or_default());
+                let leaves = tree.walk(values.get(group * LANES..).unwrap_or_default());
                 let leaves = leaves.as_flattened();
-                out.iter_mut().zip(leaves).for_each(|(out, &leaf)| *out += tree.nodes[leaf as usize].value);
+                out.iter_mut().zip(leaves).for_each(|(out, &leaf)| *out += tree.values[leaf as usize]);
             }
         }
         let count = self.trees.len() as f32;
@@ -51,40 +63,57 @@ impl<'a> Lanes<'a> {
     }
 }
 
-/// Leaves that the points whose features begin `values`, plane by plane, fall into.
-#[inline]
-fn walk(steps: &[Step], depth: usize, values: &[f32]) -> [[u32; 8]; LANES / 8] {
-    let mut at = [[0u32; 8]; LANES / 8];
-    // Always as many steps as the deepest leaf needs: asking at each whether all have arrived costs more.
-    for _ in 0..depth {
-        for (group, at) in at.iter_mut().enumerate() {
-            let here = at.map(|at| steps[at as usize]);
-            let value = |lane: usize| values.get(here[lane].plane as usize + 8 * group + lane).copied().unwrap_or(0.0);
-            let value: [f32; 8] = std::array::from_fn(value);
-            // As vectors, because the compiler makes a jump of a scalar comparison, and which way it goes cannot be foreseen.
-            let below = f32x8::new(value).simd_lt(f32x8::new(here.map(|s| s.threshold)));
-            let skip = (!below & f32x8::new(here.map(|s| f32::from_bits(s.skip)))).to_array();
-            *at = std::array::from_fn(|lane| (at[lane] + 1).wrapping_add(skip[lane].to_bits()));
+impl Walk {
+    /// Puts what is left of the tree below `node`, `depth` steps from the root, to `here`.
+    fn copy(&mut self, tree: &Tree, mut node: usize, here: usize, depth: usize, plane: &impl Fn(u16) -> Option<u32>) {
+        self.depth = self.depth.max(depth);
+        loop {
+            let Node { feature, value, above } = tree.nodes[node];
+            if feature == LEAF {
+                // Leads to itself whatever is read.
+                self.steps[here] = Step { plane: 0, threshold: f32::NAN, below: (here as u32).wrapping_sub(1) };
+                self.values[here] = value;
+                return;
+            }
+            let Some(plane_start) = plane(feature) else {
+                node = if value <= 0.0 { above as usize } else { node + 1 };
+                continue;
+            };
+            let below = self.steps.len();
+            self.steps[here] = Step { plane: plane_start, threshold: value, below: below as u32 };
+            self.steps.resize(below + 2, Step::default());
+            self.values.resize(below + 2, 0.0);
+            self.copy(tree, node + 1, below, depth + 1, plane);
+            return self.copy(tree, above as usize, below + 1, depth + 1, plane);
         }
     }
-    at
-}
 
-fn steps(tree: &Tree, planes: &[Option<usize>], stride: usize) -> Vec<Step> {
-    // Leads to one place whatever the value is.
-    let always = |here: u32, to: u32| Step { plane: 0, threshold: f32::NEG_INFINITY, skip: to.wrapping_sub(here + 1) };
-    let step = |(i, node): (usize, &super::Node)| {
-        let here = i as u32;
-        if node.feature == LEAF {
-            return always(here, here);
+    /// Leaves that the points whose features begin `values`, plane by plane, fall into.
+    #[inline]
+    fn walk(&self, values: &[f32]) -> [[u32; 8]; LANES / 8] {
+        let mut at = [[0u32; 8]; LANES / 8];
+        for _ in 0..self.depth.div_ceil(STRETCH) {
+            let before = at;
+            for _ in 0..STRETCH {
+                for (group, at) in at.iter_mut().enumerate() {
+                    *at = self.step(*at, values.get(8 * group..).unwrap_or_default());
+                }
+            }
+            if at == before {
+                break;
+            }
         }
-        match planes[usize::from(node.feature)] {
-            Some(plane) => Step { plane: (plane * stride) as u32, threshold: node.value, skip: node.above - here - 1 },
-            None if node.value <= 0.0 => always(here, node.above),
-            None => always(here, here + 1),
-        }
-    };
-    tree.nodes.iter().enumerate().map(step).collect()
+        at
+    }
+
+    #[inline]
+    fn step(&self, at: [u32; 8], values: &[f32]) -> [u32; 8] {
+        std::array::from_fn(|lane| {
+            let here = self.steps[at[lane] as usize];
+            let value = values.get(here.plane as usize + lane).copied().unwrap_or(0.0);
+            here.below.wrapping_add(u32::from(!(value < here.threshold)))
+        })
+    }
 }
 
 #[cfg(test)]

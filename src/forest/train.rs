@@ -25,6 +25,9 @@ pub struct Settings {
     pub min_rows: usize,
     /// Least weight per leaf as a share of the weight of all rows that grow the tree, in [0, 1].
     pub min_weight: f64,
+    /// Most features that a forest may ask for, ≥ 1: those with the largest weighted mean over the rows. Each costs the
+    /// reading of a layer of both images.
+    pub max_features: usize,
     /// Share of the features that each split may choose from, in (0, 1]; 1 tries all.
     pub features_per_split: f64,
     /// Whether each tree grows on a bootstrap sample (bagging, Breiman 1996) of its rows.
@@ -49,6 +52,7 @@ impl Default for Settings {
             max_leaves: 700,
             min_rows: 20,
             min_weight: 1e-4,
+            max_features: usize::from(u16::MAX),
             features_per_split: 1.0,
             bootstrap: true,
             refinement: 0.5,
@@ -81,6 +85,9 @@ impl Settings {
         if !(0.0..=1.0).contains(&self.min_weight) {
             return wrong("min_weight", self.min_weight.to_string(), "0 to 1");
         }
+        if self.max_features < 1 {
+            return wrong("max_features", self.max_features.to_string(), "1 or more");
+        }
         if !(self.features_per_split > 0.0 && self.features_per_split <= 1.0) {
             return wrong("features_per_split", self.features_per_split.to_string(), "more than 0, up to 1");
         }
@@ -106,7 +113,7 @@ pub fn train(rows: &Rows, settings: &Settings) -> Result<Forest, ForestError> {
     if !rows.weights().iter().any(|&w| w > 0.0) {
         return Err(ForestError::NoRows { rows: rows.len() });
     }
-    let binned = Binned::of(rows);
+    let binned = Binned::of(rows, settings.max_features);
     let mut random = Xoshiro256PlusPlus::seed_from_u64(settings.seed);
     let streams: Vec<_> = (0..settings.trees)
         .map(|_| {
