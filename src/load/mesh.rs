@@ -52,6 +52,7 @@ impl RawMesh {
         Mesh {
             positions: positions.iter().map(|p| p.as_vec3()).collect(),
             normals: normals.iter().map(|n| n.as_vec3()).collect(),
+            uvs: Vec::new(),
             triangles,
         }
     }

@@ -8,7 +8,7 @@ use crate::film::Filter;
 use crate::geometry::{Bvh, Solid, geometric_normal, offset};
 use crate::math::Discrete;
 use crate::spectrum::Spectrum;
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use thiserror::Error;
 
 /// A triangle mesh in world space.
@@ -18,6 +18,8 @@ pub struct Mesh {
     pub positions: Vec<Vec3>,
     /// Unit normals per position; empty for a mesh with flat faces.
     pub normals: Vec<Vec3>,
+    /// Texture coordinates per position; empty for a mesh without.
+    pub uvs: Vec<Vec2>,
     /// Indices into the positions, counter-clockwise as seen from outside.
     pub triangles: Vec<[u32; 3]>,
 }

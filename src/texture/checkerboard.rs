@@ -1,0 +1,22 @@
+//! Squares of two colours.
+
+use crate::spectrum::Spectrum;
+use glam::{DAffine2, DVec2};
+
+/// Two by two squares per unit of the transformed texture plane, as in Mitsuba.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Checkerboard {
+    /// The colours; the square at the origin has the second.
+    pub colours: [Spectrum; 2],
+    /// From texture coordinates to the plane of the squares.
+    pub to_uv: DAffine2,
+}
+
+impl Checkerboard {
+    #[inline]
+    pub(super) fn colour(&self, uv: DVec2) -> Spectrum {
+        let at = self.to_uv.transform_point2(uv);
+        let low = |v: f64| v - v.floor() < 0.5;
+        self.colours[usize::from(low(at.x) == low(at.y))]
+    }
+}
