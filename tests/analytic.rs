@@ -48,7 +48,7 @@ fn room() -> Mesh {
             triangle.swap(1, 2);
         }
     }
-    Mesh { positions, normals: Vec::new(), triangles }
+    Mesh { positions, triangles, ..Mesh::default() }
 }
 
 fn diffuse(reflectance: f64) -> Bsdf {
