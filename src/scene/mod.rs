@@ -13,7 +13,7 @@ use crate::camera::Camera;
 use crate::emitter::{Emitter, Start};
 use crate::geometry::{Bvh, NO_TRIANGLE, Primitive, Ray, Solid, SurfacePoint};
 use crate::math::{AreaPdf, Discrete, Frame, Row};
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 
 /// Index into the scene's scattering models.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -28,6 +28,10 @@ pub struct EmitterId(pub u32);
 struct Shape {
     bsdf: BsdfId,
     emitter: Option<EmitterId>,
+    /// Whether anything on it varies over the surface.
+    textured: bool,
+    /// Whether its vertices have texture coordinates.
+    mapped: bool,
 }
 
 /// What every point of a triangle shares.
@@ -54,6 +58,8 @@ pub struct Scene {
     vertices: Vec<Vec3>,
     /// Normals per vertex; zero where a mesh has none.
     normals: Vec<Vec3>,
+    /// Texture coordinates per vertex; zero where a mesh has none.
+    uvs: Vec<Vec2>,
     triangles: Vec<[u32; 3]>,
     faces: Vec<Face>,
     triangle_shapes: Vec<u32>,
@@ -90,17 +96,27 @@ impl Scene {
         } else {
             (normal, normal)
         };
-        let Shape { bsdf, emitter } = self.shapes[self.triangle_shapes[index] as usize];
+        let Shape { bsdf, emitter, textured, mapped } = self.shapes[self.triangle_shapes[index] as usize];
+        let uv = match (textured, mapped) {
+            (false, _) => DVec2::ZERO,
+            // As Mitsuba has it.
+            (true, false) => DVec2::new(u, v),
+            (true, true) => {
+                let [a, b, c] = corners.map(|i| self.uvs[i as usize].as_dvec2());
+                a * w + b * u + c * v
+            }
+        };
         let (position, frame, triangle) = (a * w + b * u + c * v, Frame::around(shading), index as u32);
-        Surface { position, geometric, frame, bsdf, emitter, offset, triangle }
+        Surface { position, geometric, frame, uv, bsdf, emitter, offset, triangle }
     }
 
     #[inline]
     fn solid_surface(&self, index: usize, near: DVec3) -> Surface {
         let SurfacePoint { position, normal, offset, .. } = self.solids[index].surface_point(near);
-        let Shape { bsdf, emitter } = self.shapes[self.solid_shapes[index] as usize];
+        let Shape { bsdf, emitter, .. } = self.shapes[self.solid_shapes[index] as usize];
         let frame = Frame::around(normal);
-        Surface { position, geometric: normal, frame, bsdf, emitter, offset, triangle: NO_TRIANGLE }
+        let uv = DVec2::ZERO;
+        Surface { position, geometric: normal, frame, uv, bsdf, emitter, offset, triangle: NO_TRIANGLE }
     }
 
     /// The scattering model `id`.
