@@ -8,6 +8,7 @@ use crate::film::Filter;
 use crate::geometry::{Bvh, Solid, geometric_normal, offset};
 use crate::math::Discrete;
 use crate::spectrum::Spectrum;
+use crate::texture::Relief;
 use glam::{DVec3, Vec2, Vec3};
 use thiserror::Error;
 
@@ -76,6 +77,7 @@ pub struct Builder {
     solid_shapes: Vec<u32>,
     shapes: Vec<Shape>,
     bsdfs: Vec<Bsdf>,
+    reliefs: Vec<Option<Relief>>,
     emitters: Vec<Emitter>,
     environment: Option<Spectrum>,
     hasher: blake3::Hasher,
@@ -89,8 +91,14 @@ impl Builder {
 
     /// Adds a scattering model.
     pub fn bsdf(&mut self, bsdf: Bsdf) -> BsdfId {
+        self.reliefs.push(None);
         self.bsdfs.push(bsdf);
         BsdfId(self.bsdfs.len() as u32 - 1)
+    }
+
+    /// Gives a relief to the surfaces of a model, to be called before these are added.
+    pub fn relief(&mut self, id: BsdfId, relief: Relief) {
+        self.reliefs[id.0 as usize] = Some(relief);
     }
 
     /// Adds a mesh, which shines with `radiance` where one is given.
@@ -145,8 +153,9 @@ impl Builder {
             }
             None => None,
         };
-        let textured = !self.bsdfs[bsdf.0 as usize].is_constant();
-        self.shapes.push(Shape { bsdf, emitter, textured, mapped });
+        let oriented = self.reliefs[bsdf.0 as usize].is_some();
+        let textured = oriented || !self.bsdfs[bsdf.0 as usize].is_constant();
+        self.shapes.push(Shape { bsdf, emitter, textured, oriented, mapped });
         Ok(self.shapes.len() as u32 - 1)
     }
 
@@ -207,6 +216,7 @@ impl Builder {
             solid_shapes: self.solid_shapes,
             shapes: self.shapes,
             bsdfs: self.bsdfs,
+            reliefs: self.reliefs,
             lights: Discrete::new(&powers),
             emitters: self.emitters,
             environment,

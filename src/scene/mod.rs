@@ -2,6 +2,7 @@
 
 mod builder;
 mod caster;
+mod relief;
 mod surface;
 
 pub use builder::{Builder, FilmSpec, Mesh, SceneError, Shine};
@@ -13,6 +14,7 @@ use crate::camera::Camera;
 use crate::emitter::{Emitter, Start};
 use crate::geometry::{Bvh, NO_TRIANGLE, Primitive, Ray, Solid, SurfacePoint};
 use crate::math::{AreaPdf, Discrete, Frame, Row};
+use crate::texture::Relief;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
 /// Index into the scene's scattering models.
@@ -30,6 +32,8 @@ struct Shape {
     emitter: Option<EmitterId>,
     /// Whether anything on it varies over the surface.
     textured: bool,
+    /// Whether its shading frames must follow the texture coordinates.
+    oriented: bool,
     /// Whether its vertices have texture coordinates.
     mapped: bool,
 }
@@ -67,6 +71,8 @@ pub struct Scene {
     solid_shapes: Vec<u32>,
     shapes: Vec<Shape>,
     bsdfs: Vec<Bsdf>,
+    /// By scattering model.
+    reliefs: Vec<Option<Relief>>,
     emitters: Vec<Emitter>,
     /// Choice of an emitter by its power; `None` when nothing shines.
     lights: Option<Discrete>,
@@ -96,18 +102,30 @@ impl Scene {
         } else {
             (normal, normal)
         };
-        let Shape { bsdf, emitter, textured, mapped } = self.shapes[self.triangle_shapes[index] as usize];
-        let uv = match (textured, mapped) {
-            (false, _) => DVec2::ZERO,
-            // As Mitsuba has it.
-            (true, false) => DVec2::new(u, v),
-            (true, true) => {
-                let [a, b, c] = corners.map(|i| self.uvs[i as usize].as_dvec2());
-                a * w + b * u + c * v
+        let Shape { bsdf, emitter, textured, oriented, mapped } = self.shapes[self.triangle_shapes[index] as usize];
+        let (mut uv, mut frame) = (DVec2::ZERO, Frame::around(shading));
+        if textured {
+            // Without texture coordinates, barycentric ones stand in, as in Mitsuba.
+            let uvs = match mapped {
+                true => corners.map(|i| self.uvs[i as usize].as_dvec2()),
+                false => [DVec2::ZERO, DVec2::X, DVec2::Y],
+            };
+            uv = uvs[0] * w + uvs[1] * u + uvs[2] * v;
+            if oriented {
+                frame = self.orient(shading, bsdf, uv, relief::derivatives([a, b, c], uvs, normal));
             }
-        };
-        let (position, frame, triangle) = (a * w + b * u + c * v, Frame::around(shading), index as u32);
+        }
+        let (position, triangle) = (a * w + b * u + c * v, index as u32);
         Surface { position, geometric, frame, uv, bsdf, emitter, offset, triangle }
+    }
+
+    /// The shading frame where it has to follow the texture coordinates.
+    fn orient(&self, normal: DVec3, bsdf: BsdfId, uv: DVec2, derivatives: [DVec3; 2]) -> Frame {
+        let frame = relief::oriented(normal, derivatives[0]);
+        match &self.reliefs[bsdf.0 as usize] {
+            Some(relief) => relief::tilted(frame, relief, uv, derivatives),
+            None => frame,
+        }
     }
 
     #[inline]
