@@ -52,7 +52,7 @@ fn room() -> Mesh {
 }
 
 fn diffuse(reflectance: f64) -> Bsdf {
-    Bsdf::Diffuse(Diffuse { reflectance: Spectrum::grey(reflectance) })
+    Bsdf::Diffuse(Diffuse { reflectance: Spectrum::grey(reflectance).into() })
 }
 
 /// Mean over pixels and seeds of `value`, with its standard error over seeds.

@@ -28,7 +28,7 @@ fn bsdfs(xml: &str) -> Vec<Bsdf> {
 }
 
 fn grey(reflectance: f64) -> Bsdf {
-    Bsdf::Diffuse(Diffuse { reflectance: Spectrum::grey(reflectance) })
+    Bsdf::Diffuse(Diffuse { reflectance: Spectrum::grey(reflectance).into() })
 }
 
 fn glass(eta: f64) -> Bsdf {

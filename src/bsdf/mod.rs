@@ -1,5 +1,9 @@
 //! Scattering at surfaces. Directions are unit vectors in the shading frame (normal = +z) and point away from the
-//! surface: `wi` back to the previous vertex of the walk, `wo` on to the next.
+//! surface: `wi` back to the previous vertex of the walk, `wo` on to the next. `uv` are the texture coordinates of the
+//! point.
+//!
+//! A model may have delta lobes beside others. [`Bsdf::evaluate`] knows of the others only; [`Bsdf::sample`] chooses
+//! among all, and says of what kind its choice was.
 //!
 //! A new variant: its file with `evaluate`, `sample`, `invert` side by side, one arm in each match below, one line in
 //! the law tests at the end. The compiler lists the arms.
@@ -19,7 +23,7 @@ pub use rough_conductor::RoughConductor;
 
 use crate::math::{Row, SolidAnglePdf, Walk};
 use crate::spectrum::Spectrum;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 /// The letter that a vertex has in Heckbert's notation, for one pair of directions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -37,9 +41,11 @@ pub const GLOSSY_ALPHA: f64 = 0.2;
 /// What a connection needs to know of a scattering event with given directions.
 #[derive(Clone, Copy, Debug)]
 pub struct Evaluation {
-    /// BSDF value f in 1/sr, without cosine; delta lobes contribute nothing.
+    /// BSDF value f in 1/sr, without cosine, for light that travels against a walk from the camera and with one from a
+    /// light; delta lobes contribute nothing.
     pub value: Spectrum,
-    /// Density with which [`Bsdf::sample`] takes `wi` to `wo`.
+    /// Density with which [`Bsdf::sample`] takes `wi` to `wo`; over all directions it adds up to the probability that no
+    /// delta lobe is chosen.
     pub pdf: SolidAnglePdf,
     /// Density with which it would take `wo` to `wi`.
     pub pdf_reverse: SolidAnglePdf,
@@ -91,42 +97,47 @@ fn flip(w: DVec3) -> DVec3 {
 impl Bsdf {
     /// Value, densities and letter for a pair of directions; `None` where the value is zero, always so for delta lobes.
     #[inline]
-    pub fn evaluate(&self, wi: DVec3, wo: DVec3) -> Option<Evaluation> {
+    pub fn evaluate(&self, uv: DVec2, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
         match self {
-            Self::Diffuse(diffuse) => diffuse.evaluate(wi, wo),
+            Self::Diffuse(diffuse) => diffuse.evaluate(uv, wi, wo),
             Self::RoughConductor(rough) => rough.evaluate(wi, wo),
             Self::Conductor(_) | Self::Dielectric(_) => None,
-            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].evaluate(wi, wo),
-            Self::TwoSided(sides) => sides[1].evaluate(flip(wi), flip(wo)),
+            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].evaluate(uv, wi, wo, walk),
+            Self::TwoSided(sides) => sides[1].evaluate(uv, flip(wi), flip(wo), walk),
         }
     }
 
     /// Samples a direction from the first three numbers of `row`; `None` where light is absorbed.
     #[inline]
-    pub fn sample(&self, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
+    pub fn sample(&self, uv: DVec2, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
         match self {
-            Self::Diffuse(diffuse) => diffuse.sample(wi, row),
+            Self::Diffuse(diffuse) => diffuse.sample(uv, wi, row),
             Self::RoughConductor(rough) => rough.sample(wi, row),
             Self::Conductor(conductor) => conductor.sample(wi),
             Self::Dielectric(dielectric) => dielectric.sample(wi, row, walk),
-            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].sample(wi, row, walk),
+            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].sample(uv, wi, row, walk),
             Self::TwoSided(sides) => {
-                let scatter = sides[1].sample(flip(wi), row, walk)?;
+                let scatter = sides[1].sample(uv, flip(wi), row, walk)?;
                 Some(Scatter { direction: flip(scatter.direction), ..scatter })
             }
         }
     }
 
     /// A row that [`Bsdf::sample`] takes from `wi` to `wo`; numbers that the sampling leaves open are taken from
-    /// `gamma`. `None` where `wo` cannot be sampled.
-    pub fn invert(&self, wi: DVec3, wo: DVec3, gamma: Row) -> Option<Row> {
+    /// `gamma`. `delta` says whether a delta lobe is to be chosen, which the directions alone do not. `None` where `wo`
+    /// cannot be sampled so.
+    pub fn invert(&self, uv: DVec2, wi: DVec3, wo: DVec3, delta: bool, gamma: Row) -> Option<Row> {
+        if !delta && self.is_delta(wi) {
+            return None;
+        }
         match self {
+            Self::Diffuse(_) | Self::RoughConductor(_) if delta => None,
             Self::Diffuse(diffuse) => diffuse.invert(wi, wo, gamma),
             Self::RoughConductor(rough) => rough.invert(wi, wo, gamma),
             Self::Conductor(conductor) => conductor.invert(wi, wo, gamma),
             Self::Dielectric(dielectric) => dielectric.invert(wi, wo, gamma),
-            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].invert(wi, wo, gamma),
-            Self::TwoSided(sides) => sides[1].invert(flip(wi), flip(wo), gamma),
+            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].invert(uv, wi, wo, delta, gamma),
+            Self::TwoSided(sides) => sides[1].invert(uv, flip(wi), flip(wo), delta, gamma),
         }
     }
 
@@ -138,6 +149,26 @@ impl Bsdf {
             Self::Conductor(_) | Self::Dielectric(_) => true,
             Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].is_delta(wi),
             Self::TwoSided(sides) => sides[1].is_delta(flip(wi)),
+        }
+    }
+
+    /// Whether it is the same everywhere, so that texture coordinates do not matter.
+    pub fn is_constant(&self) -> bool {
+        match self {
+            Self::Diffuse(diffuse) => diffuse.reflectance.is_constant(),
+            Self::Conductor(_) | Self::Dielectric(_) | Self::RoughConductor(_) => true,
+            Self::TwoSided(sides) => sides.iter().all(Bsdf::is_constant),
+        }
+    }
+
+    /// Whether some lobes for light from `wi` are Dirac densities, so that a walk may go on by one.
+    #[inline]
+    pub fn has_delta(&self, wi: DVec3) -> bool {
+        match self {
+            Self::Diffuse(_) | Self::RoughConductor(_) => false,
+            Self::Conductor(_) | Self::Dielectric(_) => true,
+            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].has_delta(wi),
+            Self::TwoSided(sides) => sides[1].has_delta(flip(wi)),
         }
     }
 

@@ -5,6 +5,8 @@
 use super::*;
 use crate::math::{Stream, warp};
 
+const UV: DVec2 = DVec2::new(0.3, 0.7);
+
 /// The models under test; a new variant joins by one line.
 fn models() -> Vec<(&'static str, Bsdf)> {
     let gold = Conductor {
@@ -15,7 +17,7 @@ fn models() -> Vec<(&'static str, Bsdf)> {
     let rough = |metal, distribution, alpha| {
         Bsdf::RoughConductor(RoughConductor { metal, microfacet: Microfacet { distribution, alpha } })
     };
-    let diffuse = Bsdf::Diffuse(Diffuse { reflectance: Spectrum::rgb(0.2, 0.5, 0.9) });
+    let diffuse = Bsdf::Diffuse(Diffuse { reflectance: Spectrum::rgb(0.2, 0.5, 0.9).into() });
     vec![
         ("diffuse", diffuse.clone()),
         ("conductor", Bsdf::Conductor(gold)),
@@ -49,16 +51,16 @@ fn sampling_agrees_with_evaluation() {
         let mut stream = Stream::new(3, &[]);
         for _ in 0..20_000 {
             let wi = incident(&mut stream);
-            let Some(scatter) = bsdf.sample(wi, stream.row(), Walk::FromLight) else { continue };
+            let Some(scatter) = bsdf.sample(UV, wi, stream.row(), Walk::FromLight) else { continue };
             assert!((scatter.direction.length() - 1.0).abs() < 1e-9, "{name}");
-            let evaluation = bsdf.evaluate(wi, scatter.direction);
+            let evaluation = bsdf.evaluate(UV, wi, scatter.direction, Walk::FromLight);
             assert_eq!(evaluation.is_none(), scatter.delta, "{name}");
             let Some(evaluation) = evaluation else { continue };
             let weight = evaluation.value * (scatter.direction.z.abs() / evaluation.pdf.0);
             for (a, b) in weight.to_rgb().into_iter().zip(scatter.weight.to_rgb()) {
                 assert!((a - b).abs() < 1e-9 * b.max(1.0), "{name}: {a} {b}");
             }
-            let back = bsdf.evaluate(scatter.direction, wi).expect("the way back exists");
+            let back = bsdf.evaluate(UV, scatter.direction, wi, Walk::FromLight).expect("the way back exists");
             assert!((back.pdf.0 - evaluation.pdf_reverse.0).abs() <= 1e-9 * back.pdf.0, "{name}");
             for (a, b) in back.value.to_rgb().into_iter().zip(evaluation.value.to_rgb()) {
                 assert!((a - b).abs() <= 1e-9 * b, "{name} is not reciprocal: {a} {b}");
@@ -74,12 +76,14 @@ fn rows_invert() {
         for _ in 0..20_000 {
             let wi = incident(&mut stream);
             let row = stream.row();
-            let Some(scatter) = bsdf.sample(wi, row, Walk::FromCamera) else { continue };
-            let back = bsdf.invert(wi, scatter.direction, stream.row()).expect("a sampled direction inverts");
+            let Some(scatter) = bsdf.sample(UV, wi, row, Walk::FromCamera) else { continue };
+            let back = bsdf
+                .invert(UV, wi, scatter.direction, scatter.delta, stream.row())
+                .expect("a sampled direction inverts");
             if !scatter.delta {
                 assert!((back[1] - row[1]).abs() < 1e-6 && (back[2] - row[2]).abs() < 1e-6, "{name}: {row:?} {back:?}");
             }
-            let again = bsdf.sample(wi, back, Walk::FromCamera).expect("the inverse samples");
+            let again = bsdf.sample(UV, wi, back, Walk::FromCamera).expect("the inverse samples");
             assert!((again.direction - scatter.direction).length() < 1e-7, "{name}");
         }
     }
@@ -94,10 +98,10 @@ fn sampled_and_uniform_albedo_agree_and_conserve_energy() {
             let n = 200_000;
             let (mut sampled, mut uniform) = (Moments::default(), Moments::default());
             for _ in 0..n {
-                let scatter = bsdf.sample(wi, stream.row(), Walk::FromLight);
+                let scatter = bsdf.sample(UV, wi, stream.row(), Walk::FromLight);
                 sampled.push(scatter.filter(|s| !s.delta).map_or(0.0, |s| s.weight.luminance()));
                 let wo = warp::sphere::sample([stream.number(), stream.number()]);
-                let value = bsdf.evaluate(wi, wo).map_or(0.0, |e| e.value.luminance());
+                let value = bsdf.evaluate(UV, wi, wo, Walk::FromLight).map_or(0.0, |e| e.value.luminance());
                 uniform.push(value * wo.z.abs() / warp::sphere::PDF.0);
             }
             let error = (sampled.variance_of_mean() + uniform.variance_of_mean()).sqrt();
@@ -114,7 +118,7 @@ fn refraction_squeezes_radiance_only() {
         specular_reflectance: Spectrum::ONE,
         specular_transmittance: Spectrum::ONE,
     });
-    let weight = |walk| glass.sample(DVec3::Z, [0.5; 4], walk).expect("passes").weight.to_rgb()[0];
+    let weight = |walk| glass.sample(UV, DVec3::Z, [0.5; 4], walk).expect("passes").weight.to_rgb()[0];
     assert!((weight(Walk::FromCamera) - 1.0 / 2.25).abs() < 1e-12);
     assert!((weight(Walk::FromLight) - 1.0).abs() < 1e-12);
 }

@@ -88,7 +88,7 @@ impl Sppm {
             let mut stream = Stream::new(self.seed, &[0, pass, index as u64]);
             let mut gathers = Vec::new();
             for pixel in band.pixels() {
-                gathers.extend(self.walk(&caster, &kernel, size, pixel, radius, &mut stream, band));
+                self.walk(&caster, &kernel, size, pixel, radius, &mut stream, band, &mut gathers);
             }
             (gathers, caster.rays())
         });
@@ -107,7 +107,8 @@ impl Sppm {
         self.shrinkage *= (n + ALPHA) / (n + 1.0);
     }
 
-    /// Walks from the camera to the first diffuse-like vertex, adding light met on the way and direct light.
+    /// Walks from the camera to the first diffuse-like vertex, adding light met on the way and direct light. What such a
+    /// vertex scatters by delta lobes is not gathered there: by these the walk goes on.
     #[allow(clippy::too_many_arguments)]
     fn walk(
         &self,
@@ -118,25 +119,29 @@ impl Sppm {
         radius_per_distance: f64,
         stream: &mut Stream,
         band: &mut Band,
-    ) -> Option<Gather> {
+        gathers: &mut Vec<Gather>,
+    ) {
         let row = stream.row();
         let mut state = State::at_camera(scene, film_position(kernel, size, pixel, row), row);
         let mut distance = 0.0;
         for edges in 1..=self.max_depth {
             let Some(surface) = scene.intersect(state.origin, state.direction) else {
                 path::background(scene, &state, pixel, band);
-                return None;
+                return;
             };
             distance += surface.position.distance(state.origin.point);
             path::emission(scene, &surface, &state, pixel, band);
             if edges == self.max_depth {
-                return None;
+                return;
             }
             let wi = surface.frame.to_local(-state.direction);
             let bsdf = scene.bsdf(surface.bsdf);
-            if bsdf.gathers(wi) {
-                path::direct(scene, &surface, wi, &state, false, stream, pixel, band);
-                return Some(Gather {
+            let gathered = bsdf.gathers(wi);
+            if !bsdf.is_delta(wi) {
+                path::direct(scene, &surface, wi, &state, !gathered, stream, pixel, band);
+            }
+            if gathered {
+                gathers.push(Gather {
                     surface,
                     back: -state.direction,
                     throughput: state.throughput,
@@ -145,14 +150,16 @@ impl Sppm {
                     radius: radius_per_distance * distance,
                     pixel,
                 });
+                if !bsdf.has_delta(wi) {
+                    return;
+                }
             }
-            if !bsdf.is_delta(wi) {
-                path::direct(scene, &surface, wi, &state, true, stream, pixel, band);
+            let Some(scatter) = bsdf.sample(surface.uv, wi, stream.row(), Walk::FromCamera) else { return };
+            if gathered && !scatter.delta {
+                return;
             }
-            let scatter = bsdf.sample(wi, stream.row(), Walk::FromCamera)?;
             state = state.scattered(&surface, &scatter, scatter.weight);
         }
-        None
     }
 
     /// The photons of one job, with the number of rays that it cast.
@@ -192,7 +199,7 @@ impl Sppm {
                 return;
             }
             let wo = surface.frame.to_local(photon.back);
-            let Some(scattered) = bsdf.evaluate(wi, wo) else { return };
+            let Some(scattered) = bsdf.evaluate(surface.uv, wi, wo, Walk::FromCamera) else { return };
             // Photons arrive per true area, scattering counts area seen along the shading normal.
             let geometric = photon.back.dot(surface.geometric).abs();
             let correction = if geometric > 0.0 { wo.z.abs() / geometric } else { 0.0 };

@@ -14,14 +14,14 @@ const GREY: f64 = 0.5;
 
 /// The model of shapes without a BSDF.
 pub(super) fn default() -> Bsdf {
-    Bsdf::Diffuse(Diffuse { reflectance: Spectrum::grey(GREY) })
+    Bsdf::Diffuse(Diffuse { reflectance: Spectrum::grey(GREY).into() })
 }
 
 /// Reads a scattering model.
 pub(super) fn read(element: Element<'_>) -> Result<Bsdf, LoadError> {
     let mut plugin = Plugin::new(element)?;
     let bsdf = match plugin.kind {
-        "diffuse" => Bsdf::Diffuse(Diffuse { reflectance: plugin.share("reflectance", GREY)? }),
+        "diffuse" => Bsdf::Diffuse(Diffuse { reflectance: plugin.share("reflectance", GREY)?.into() }),
         "conductor" => Bsdf::Conductor(conductor(&mut plugin)?),
         "roughconductor" => Bsdf::RoughConductor(rough_conductor(&mut plugin)?),
         "dielectric" => Bsdf::Dielectric(dielectric(&mut plugin)?),
@@ -34,7 +34,7 @@ pub(super) fn read(element: Element<'_>) -> Result<Bsdf, LoadError> {
 
 /// The model as it is on a surface whose normal points the other way.
 pub(super) fn turned(bsdf: Bsdf) -> Bsdf {
-    let black = Bsdf::Diffuse(Diffuse { reflectance: Spectrum::BLACK });
+    let black = Bsdf::Diffuse(Diffuse { reflectance: Spectrum::BLACK.into() });
     match bsdf {
         Bsdf::Dielectric(glass) => Bsdf::Dielectric(Dielectric { eta: 1.0 / glass.eta, ..glass }),
         Bsdf::TwoSided(sides) => {
@@ -112,7 +112,7 @@ fn two_sided(plugin: &mut Plugin<'_>) -> Result<Bsdf, LoadError> {
 mod tests {
     use super::*;
     use crate::math::{Stream, Walk};
-    use glam::DVec3;
+    use glam::{DVec2, DVec3};
 
     /// A turned model does from below what the model does from above.
     #[test]
@@ -126,8 +126,8 @@ mod tests {
             for wi in [DVec3::new(0.6, 0.0, 0.8), DVec3::new(0.0, 0.28, -0.96)] {
                 let row = stream.row();
                 let mirrored = |w: DVec3| DVec3::new(w.x, w.y, -w.z);
-                let here = bsdf.sample(wi, row, Walk::FromCamera);
-                let there = other.sample(mirrored(wi), row, Walk::FromCamera);
+                let here = bsdf.sample(DVec2::ZERO, wi, row, Walk::FromCamera);
+                let there = other.sample(DVec2::ZERO, mirrored(wi), row, Walk::FromCamera);
                 let seen = here.map(|s| (s.direction, s.weight));
                 let expected = there.filter(|s| !s.weight.is_black()).map(|s| (mirrored(s.direction), s.weight));
                 assert_eq!(seen.is_some(), expected.is_some(), "{bsdf:?} {wi}");

@@ -103,7 +103,8 @@ fn end_of(scene: &Caster<'_>, vertices: &[Vertex], direction: DVec3, walk: Walk)
         }
         VertexKind::Surface(surface) => {
             let (wi, wo) = (surface.frame.to_local(end.back), surface.frame.to_local(direction));
-            let Evaluation { value, pdf, pdf_reverse, letter } = scene.bsdf(surface.bsdf).evaluate(wi, wo)?;
+            let Evaluation { value, pdf, pdf_reverse, letter } =
+                scene.bsdf(surface.bsdf).evaluate(surface.uv, wi, wo, walk)?;
             let correction = shading_correction(surface, end.back, direction, walk);
             let previous = &vertices[vertices.len() - 2];
             let word = match walk {
@@ -145,7 +146,7 @@ fn join(
     end: &Vertex,
     heuristic: Heuristic,
 ) -> Option<Connection> {
-    if start.delta || end.delta {
+    if !start.connects || !end.connects {
         return None;
     }
     let infinite = match &start.kind {
@@ -193,7 +194,7 @@ fn reach_camera(
     if light.len() == 1 {
         return None;
     }
-    if start.delta || matches!(start.kind, VertexKind::Light(_, Start::Infinite { .. } | Start::Point { .. })) {
+    if !start.connects || matches!(start.kind, VertexKind::Light(_, Start::Infinite { .. } | Start::Point { .. })) {
         return None;
     }
     let offset = start.position - lens;

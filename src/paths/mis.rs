@@ -55,7 +55,9 @@ pub(super) fn weight(light: &[Vertex], camera: &[Vertex], junction: &Junction, h
             _ => light[i].reverse.0,
         };
         ratio *= from_camera / light[i].forward.0;
-        let possible = if i == 0 { can_be_hit(&light[0]) } else { !light[i].delta && !light[i - 1].delta };
+        // The end of the subpath is connected, however the walk went on from there.
+        let scatters_delta = light[i].delta && i < light.len() - 1;
+        let possible = if i == 0 { can_be_hit(&light[0]) } else { !scatters_delta && !light[i - 1].delta };
         if possible {
             sum += heuristic.apply(ratio);
         }
@@ -63,8 +65,6 @@ pub(super) fn weight(light: &[Vertex], camera: &[Vertex], junction: &Junction, h
 
     // Techniques with more vertices from the light; the lens cannot be hit, so its vertex stays.
     let mut ratio = 1.0;
-    // The end of a walk that met a light is no scattering vertex there: what it is made of does not matter.
-    let scatters = |i: usize| !(light.is_empty() && i == camera.len() - 1);
     for i in (1..camera.len()).rev() {
         let from_light = match camera.len() - i {
             1 => junction.camera,
@@ -72,8 +72,9 @@ pub(super) fn weight(light: &[Vertex], camera: &[Vertex], junction: &Junction, h
             _ => camera[i].reverse.0,
         };
         ratio *= from_light / camera[i].forward.0;
-        let blocked = (camera[i].delta && scatters(i)) || camera[i - 1].delta;
-        if !blocked {
+        // The end is connected, or it is the light that the walk met: however the walk went on does not matter.
+        let scatters_delta = camera[i].delta && i < camera.len() - 1;
+        if !scatters_delta && !camera[i - 1].delta {
             sum += heuristic.apply(ratio);
         }
     }

@@ -36,7 +36,9 @@ pub struct Vertex {
     /// Density of the vertex in a walk from the other side, given the two vertices that follow it in this walk. Known
     /// once the walk is two vertices further on.
     pub reverse: AreaPdf,
-    /// Whether no connection can be made here, because the model has delta lobes only.
+    /// Whether a connection can be made here: the model has more than delta lobes.
+    pub connects: bool,
+    /// Whether the walk went on from here by a delta lobe; `false` where it ended.
     pub delta: bool,
     /// Letters of the vertices before this one.
     pub word: Word,

@@ -32,6 +32,7 @@ pub fn trace_camera(
         throughput: Spectrum::ONE,
         forward: AreaPdf(1.0),
         reverse: AreaPdf(0.0),
+        connects: true,
         delta: false,
         word: Word::EMPTY,
     });
@@ -85,6 +86,7 @@ pub fn light_vertex(scene: &Caster<'_>, row: Row) -> Option<Vertex> {
         throughput: Spectrum::ONE / pdf.0,
         forward: pdf,
         reverse: AreaPdf(0.0),
+        connects: true,
         delta: false,
         word: Word::EMPTY,
     })
@@ -134,7 +136,7 @@ fn walk(
         }
         let row = rows.row(last + 1 + row_shift);
         let wi = surface.frame.to_local(vertex.back);
-        let Some(scatter) = scene.bsdf(surface.bsdf).sample(wi, row, mode) else { return };
+        let Some(scatter) = scene.bsdf(surface.bsdf).sample(surface.uv, wi, row, mode) else { return };
         let direction = surface.frame.to_world(scatter.direction);
         let mut weight = scatter.weight * shading_correction(&surface, vertex.back, direction, mode);
         // What remains of the walk's power; radiance that was squeezed by refraction is no loss.
@@ -150,6 +152,7 @@ fn walk(
         if weight.is_black() {
             return;
         }
+        path.vertices[last + 1].delta = scatter.delta;
         path.vertices[last].reverse = reverse_pdf(&path.vertices[last], &vertex, scatter.pdf_reverse);
         let word = match mode {
             Walk::FromCamera => vertex.word.preceded_by(scatter.letter),
@@ -173,6 +176,7 @@ fn environment_vertex(id: EmitterId, walker: &Walker) -> Vertex {
         throughput: walker.throughput,
         forward: AreaPdf(walker.pdf.0),
         reverse: AreaPdf(0.0),
+        connects: true,
         delta: false,
         word: walker.word,
     }
@@ -193,7 +197,8 @@ fn surface_vertex(scene: &Caster<'_>, surface: &Surface, walker: &Walker, previo
         throughput: walker.throughput,
         forward,
         reverse: AreaPdf(0.0),
-        delta: scene.bsdf(surface.bsdf).is_delta(surface.frame.to_local(-walker.direction)),
+        connects: !scene.bsdf(surface.bsdf).is_delta(surface.frame.to_local(-walker.direction)),
+        delta: false,
         word: walker.word,
     }
 }

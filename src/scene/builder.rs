@@ -8,6 +8,7 @@ use crate::film::Filter;
 use crate::geometry::{Bvh, Solid, geometric_normal, offset};
 use crate::math::Discrete;
 use crate::spectrum::Spectrum;
+use crate::texture::Relief;
 use glam::{DVec3, Vec2, Vec3};
 use thiserror::Error;
 
@@ -69,12 +70,14 @@ pub enum SceneError {
 pub struct Builder {
     vertices: Vec<Vec3>,
     normals: Vec<Vec3>,
+    uvs: Vec<Vec2>,
     triangles: Vec<[u32; 3]>,
     triangle_shapes: Vec<u32>,
     solids: Vec<Solid>,
     solid_shapes: Vec<u32>,
     shapes: Vec<Shape>,
     bsdfs: Vec<Bsdf>,
+    reliefs: Vec<Option<Relief>>,
     emitters: Vec<Emitter>,
     environment: Option<Spectrum>,
     hasher: blake3::Hasher,
@@ -88,8 +91,14 @@ impl Builder {
 
     /// Adds a scattering model.
     pub fn bsdf(&mut self, bsdf: Bsdf) -> BsdfId {
+        self.reliefs.push(None);
         self.bsdfs.push(bsdf);
         BsdfId(self.bsdfs.len() as u32 - 1)
+    }
+
+    /// Gives a relief to the surfaces of a model, to be called before these are added.
+    pub fn relief(&mut self, id: BsdfId, relief: Relief) {
+        self.reliefs[id.0 as usize] = Some(relief);
     }
 
     /// Adds a mesh, which shines with `radiance` where one is given.
@@ -108,20 +117,22 @@ impl Builder {
             if (b - a).cross(c - a).dot(towards) < 0.0 { [a, c, b] } else { [a, b, c] }
         };
         let surface = |()| Surface::triangles(mesh.triangles.iter().map(corners));
-        let shape = self.shape(bsdf, radiance, surface)?;
+        let shape = self.shape(bsdf, radiance, !mesh.uvs.is_empty(), surface)?;
         let base = self.vertices.len() as u32;
         self.triangles.extend(mesh.triangles.iter().map(|t| t.map(|i| i + base)));
         self.triangle_shapes.resize(self.triangles.len(), shape);
         self.normals.extend(&mesh.normals);
         self.vertices.extend(&mesh.positions);
         self.normals.resize(self.vertices.len(), Vec3::ZERO);
+        self.uvs.extend(&mesh.uvs);
+        self.uvs.resize(self.vertices.len(), Vec2::ZERO);
         Ok(())
     }
 
     /// Adds a sphere or a disk, which shines with `radiance` where one is given.
     pub fn solid(&mut self, solid: Solid, bsdf: BsdfId, radiance: Option<Spectrum>) -> Result<(), SceneError> {
         let surface = |()| Some(Surface::Solid(solid)).filter(|surface| surface.area() > 0.0);
-        let shape = self.shape(bsdf, radiance, surface)?;
+        let shape = self.shape(bsdf, radiance, true, surface)?;
         self.solids.push(solid);
         self.solid_shapes.push(shape);
         Ok(())
@@ -131,6 +142,7 @@ impl Builder {
         &mut self,
         bsdf: BsdfId,
         radiance: Option<Spectrum>,
+        mapped: bool,
         surface: impl FnOnce(()) -> Option<Surface>,
     ) -> Result<u32, SceneError> {
         let emitter = match radiance.filter(|radiance| !radiance.is_black()) {
@@ -141,7 +153,9 @@ impl Builder {
             }
             None => None,
         };
-        self.shapes.push(Shape { bsdf, emitter });
+        let oriented = self.reliefs[bsdf.0 as usize].is_some();
+        let textured = oriented || !self.bsdfs[bsdf.0 as usize].is_constant();
+        self.shapes.push(Shape { bsdf, emitter, textured, oriented, mapped });
         Ok(self.shapes.len() as u32 - 1)
     }
 
@@ -194,6 +208,7 @@ impl Builder {
             hash: self.hasher.finalize().to_hex()[..32].to_owned(),
             vertices: self.vertices,
             normals: self.normals,
+            uvs: self.uvs,
             triangles: self.triangles,
             faces,
             triangle_shapes: self.triangle_shapes,
@@ -201,6 +216,7 @@ impl Builder {
             solid_shapes: self.solid_shapes,
             shapes: self.shapes,
             bsdfs: self.bsdfs,
+            reliefs: self.reliefs,
             lights: Discrete::new(&powers),
             emitters: self.emitters,
             environment,

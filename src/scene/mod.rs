@@ -2,6 +2,7 @@
 
 mod builder;
 mod caster;
+mod relief;
 mod surface;
 
 pub use builder::{Builder, FilmSpec, Mesh, SceneError, Shine};
@@ -13,7 +14,8 @@ use crate::camera::Camera;
 use crate::emitter::{Emitter, Start};
 use crate::geometry::{Bvh, NO_TRIANGLE, Primitive, Ray, Solid, SurfacePoint};
 use crate::math::{AreaPdf, Discrete, Frame, Row};
-use glam::{DVec3, Vec3};
+use crate::texture::Relief;
+use glam::{DVec2, DVec3, Vec2, Vec3};
 
 /// Index into the scene's scattering models.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -28,6 +30,12 @@ pub struct EmitterId(pub u32);
 struct Shape {
     bsdf: BsdfId,
     emitter: Option<EmitterId>,
+    /// Whether anything on it varies over the surface.
+    textured: bool,
+    /// Whether its shading frames must follow the texture coordinates.
+    oriented: bool,
+    /// Whether its vertices have texture coordinates.
+    mapped: bool,
 }
 
 /// What every point of a triangle shares.
@@ -54,6 +62,8 @@ pub struct Scene {
     vertices: Vec<Vec3>,
     /// Normals per vertex; zero where a mesh has none.
     normals: Vec<Vec3>,
+    /// Texture coordinates per vertex; zero where a mesh has none.
+    uvs: Vec<Vec2>,
     triangles: Vec<[u32; 3]>,
     faces: Vec<Face>,
     triangle_shapes: Vec<u32>,
@@ -61,6 +71,8 @@ pub struct Scene {
     solid_shapes: Vec<u32>,
     shapes: Vec<Shape>,
     bsdfs: Vec<Bsdf>,
+    /// By scattering model.
+    reliefs: Vec<Option<Relief>>,
     emitters: Vec<Emitter>,
     /// Choice of an emitter by its power; `None` when nothing shines.
     lights: Option<Discrete>,
@@ -90,17 +102,39 @@ impl Scene {
         } else {
             (normal, normal)
         };
-        let Shape { bsdf, emitter } = self.shapes[self.triangle_shapes[index] as usize];
-        let (position, frame, triangle) = (a * w + b * u + c * v, Frame::around(shading), index as u32);
-        Surface { position, geometric, frame, bsdf, emitter, offset, triangle }
+        let Shape { bsdf, emitter, textured, oriented, mapped } = self.shapes[self.triangle_shapes[index] as usize];
+        let (mut uv, mut frame) = (DVec2::ZERO, Frame::around(shading));
+        if textured {
+            // Without texture coordinates, barycentric ones stand in, as in Mitsuba.
+            let uvs = match mapped {
+                true => corners.map(|i| self.uvs[i as usize].as_dvec2()),
+                false => [DVec2::ZERO, DVec2::X, DVec2::Y],
+            };
+            uv = uvs[0] * w + uvs[1] * u + uvs[2] * v;
+            if oriented {
+                frame = self.orient(shading, bsdf, uv, relief::derivatives([a, b, c], uvs, normal));
+            }
+        }
+        let (position, triangle) = (a * w + b * u + c * v, index as u32);
+        Surface { position, geometric, frame, uv, bsdf, emitter, offset, triangle }
+    }
+
+    /// The shading frame where it has to follow the texture coordinates.
+    fn orient(&self, normal: DVec3, bsdf: BsdfId, uv: DVec2, derivatives: [DVec3; 2]) -> Frame {
+        let frame = relief::oriented(normal, derivatives[0]);
+        match &self.reliefs[bsdf.0 as usize] {
+            Some(relief) => relief::tilted(frame, relief, uv, derivatives),
+            None => frame,
+        }
     }
 
     #[inline]
     fn solid_surface(&self, index: usize, near: DVec3) -> Surface {
         let SurfacePoint { position, normal, offset, .. } = self.solids[index].surface_point(near);
-        let Shape { bsdf, emitter } = self.shapes[self.solid_shapes[index] as usize];
+        let Shape { bsdf, emitter, .. } = self.shapes[self.solid_shapes[index] as usize];
         let frame = Frame::around(normal);
-        Surface { position, geometric: normal, frame, bsdf, emitter, offset, triangle: NO_TRIANGLE }
+        let uv = DVec2::ZERO;
+        Surface { position, geometric: normal, frame, uv, bsdf, emitter, offset, triangle: NO_TRIANGLE }
     }
 
     /// The scattering model `id`.

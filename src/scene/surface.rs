@@ -2,7 +2,7 @@
 
 use super::{BsdfId, EmitterId, Origin};
 use crate::math::Frame;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 /// A point on a surface.
 #[derive(Clone, Copy, Debug)]
@@ -13,6 +13,8 @@ pub struct Surface {
     pub geometric: DVec3,
     /// Shading frame.
     pub frame: Frame,
+    /// Texture coordinates.
+    pub uv: DVec2,
     /// How it scatters.
     pub bsdf: BsdfId,
     /// Whether it shines.

@@ -117,3 +117,20 @@ impl From<f64> for Number {
         Self::Constant(number)
     }
 }
+
+/// What tilts the shading normal of a surface.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Relief {
+    /// Height over the surface: the luminance of a texture.
+    Bump {
+        /// The texture.
+        texture: Arc<Texture>,
+        /// Factor on the height.
+        scale: f64,
+    },
+    /// The normal itself in the shading frame, each coordinate as half of it plus one half.
+    Normal {
+        /// The texture.
+        texture: Arc<Texture>,
+    },
+}
