@@ -1,6 +1,7 @@
 //! The scene file as a tree of elements whose `$parameters` are replaced and whose ids are known.
 
 use super::error::{LoadError, Place};
+use super::picture::Pictures;
 use super::value::Text;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
@@ -54,6 +55,8 @@ pub(super) struct Document<'a> {
     /// Values of the attributes that contain parameters, by their offset in the text.
     replaced: HashMap<usize, String>,
     ids: HashMap<String, Node<'a>>,
+    /// Images that its textures show.
+    pub pictures: Pictures,
 }
 
 impl<'a> Document<'a> {
@@ -64,7 +67,8 @@ impl<'a> Document<'a> {
         tree: &'a roxmltree::Document<'a>,
         overrides: &BTreeMap<String, String>,
     ) -> Result<Self, LoadError> {
-        let mut document = Self { source, replaced: HashMap::new(), ids: HashMap::new() };
+        let mut document =
+            Self { source, replaced: HashMap::new(), ids: HashMap::new(), pictures: Pictures::default() };
         let mut parameters = overrides.clone();
         let mut used = BTreeSet::new();
         for node in tree.root_element().descendants().filter(Node::is_element) {

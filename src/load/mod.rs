@@ -5,6 +5,7 @@
 //!
 //! - shapes `rectangle`, `cube`, `sphere`, `disk`, `obj`, `ply`;
 //! - bsdfs `diffuse`, `conductor`, `roughconductor`, `dielectric`, `twosided`, nested or by reference;
+//! - textures `bitmap`, `checkerboard`;
 //! - emitters `area`, `constant`, `point`;
 //! - sensors `perspective`, `thinlens` with an `hdrfilm` and the filters `box`, `tent`, `gaussian`;
 //! - any integrator's `max_depth`; samplers are read over.
@@ -15,10 +16,12 @@ mod error;
 mod ior;
 mod mesh;
 mod obj;
+mod picture;
 mod plugin;
 mod ply;
 mod sensor;
 mod shape;
+mod texture;
 mod transform;
 mod value;
 
@@ -40,7 +43,7 @@ pub const UNBOUNDED_DEPTH: usize = 65;
 /// Largest `max_depth` that a scene may ask for.
 pub const LARGEST_DEPTH: usize = 4096;
 
-const TAGS: [&str; 6] = ["default", "integrator", "sensor", "bsdf", "emitter", "shape"];
+const TAGS: [&str; 7] = ["default", "integrator", "sensor", "texture", "bsdf", "emitter", "shape"];
 
 /// What the caller changes about a scene.
 #[derive(Clone, Debug, Default)]
@@ -127,6 +130,7 @@ impl Reader {
             }
             // Models that no shape refers to are checked, and then left out.
             "bsdf" => bsdf::read(element).map(drop),
+            "texture" => texture::read(element).map(drop),
             "emitter" => {
                 let shine = shine(element)?;
                 self.builder.emitter(shine).map_err(|error| element.error(error.to_string()))
@@ -168,6 +172,7 @@ impl Reader {
     fn finish(mut self, root: Element<'_>) -> Result<Loaded, LoadError> {
         let (camera, film) = self.sensor.ok_or_else(|| root.error("this scene lacks a <sensor>"))?;
         self.builder.fingerprint(format!("{:?}", film.size).as_bytes());
+        root.document.pictures.fingerprint(&mut self.builder);
         let max_depth = self.max_depth.unwrap_or(UNBOUNDED_DEPTH);
         let scene = self.builder.build(camera, film, max_depth).map_err(|error| root.error(error.to_string()))?;
         if self.shapes == 0 {

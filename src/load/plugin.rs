@@ -71,7 +71,7 @@ impl<'a> Plugin<'a> {
     }
 
     /// Takes the parameter `name`, which must be one of `tags`.
-    fn take(&mut self, name: &str, tags: &[&str]) -> Result<Option<Element<'a>>, LoadError> {
+    pub(super) fn take(&mut self, name: &str, tags: &[&str]) -> Result<Option<Element<'a>>, LoadError> {
         self.asked.push(name.to_owned());
         let named = |child: &Element<'_>| child.attribute("name").is_some_and(|text| text.text == name);
         let Some(index) = self.children.iter().position(named) else {
@@ -101,6 +101,11 @@ impl<'a> Plugin<'a> {
     /// A finite number.
     pub fn float(&mut self, name: &'static str) -> Result<Option<Parameter<'a, f64>>, LoadError> {
         self.scalar(name, &["float", "integer"], |text| text.number())
+    }
+
+    /// A finite number, `default` where it is not given.
+    pub fn number(&mut self, name: &'static str, default: f64) -> Result<f64, LoadError> {
+        Ok(self.float(name)?.map_or(default, |number| number.value))
     }
 
     /// A finite number above zero.
@@ -144,10 +149,21 @@ impl<'a> Plugin<'a> {
 
     /// A transformation that can be undone, with its place; the identity where it is not given.
     pub fn placement(&mut self) -> Result<(DAffine3, Element<'a>), LoadError> {
-        match self.take("to_world", &["transform"])? {
+        self.transformation("to_world")
+    }
+
+    /// The transformation `name` that can be undone, with its place; the identity where it is not given.
+    pub fn transformation(&mut self, name: &'static str) -> Result<(DAffine3, Element<'a>), LoadError> {
+        match self.take(name, &["transform"])? {
             Some(element) => Ok((transform::read(element)?, element)),
             None => Ok((DAffine3::IDENTITY, self.element)),
         }
+    }
+
+    /// Whether the parameter `name` is there and is one of `tags`.
+    pub fn has(&self, name: &str, tags: &[&str]) -> bool {
+        let named = |child: &Element<'_>| child.attribute("name").is_some_and(|text| text.text == name);
+        self.children.iter().any(|child| named(child) && tags.contains(&child.tag()))
     }
 
     /// A colour where a spectrum that is constant stands for grey: reflectances and refractive indices.

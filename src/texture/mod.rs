@@ -1,8 +1,12 @@
 //! Quantities that vary over a surface, by its texture coordinates.
 
+mod bitmap;
 mod checkerboard;
+mod picture;
 
+pub use bitmap::{Bitmap, Lookup, Wrap};
 pub use checkerboard::Checkerboard;
+pub use picture::{Picture, Texels};
 
 use crate::spectrum::Spectrum;
 use glam::DVec2;
@@ -13,6 +17,8 @@ use std::sync::Arc;
 pub enum Texture {
     /// Squares of two colours.
     Checkerboard(Checkerboard),
+    /// An image.
+    Bitmap(Bitmap),
 }
 
 impl Texture {
@@ -21,6 +27,15 @@ impl Texture {
     pub fn colour(&self, uv: DVec2) -> Spectrum {
         match self {
             Self::Checkerboard(checkerboard) => checkerboard.colour(uv),
+            Self::Bitmap(bitmap) => bitmap.colour(uv),
+        }
+    }
+
+    /// The mean colour of the texture plane, for choices that need one number; a clamped bitmap's is the image's.
+    pub fn mean(&self) -> Spectrum {
+        match self {
+            Self::Checkerboard(checkerboard) => (checkerboard.colours[0] + checkerboard.colours[1]) * 0.5,
+            Self::Bitmap(bitmap) => bitmap.mean(),
         }
     }
 }
@@ -41,6 +56,14 @@ impl Colour {
         match self {
             Self::Constant(colour) => *colour,
             Self::Textured(texture) => texture.colour(uv),
+        }
+    }
+
+    /// The mean over the texture plane.
+    pub fn mean(&self) -> Spectrum {
+        match self {
+            Self::Constant(colour) => *colour,
+            Self::Textured(texture) => texture.mean(),
         }
     }
 
@@ -72,6 +95,14 @@ impl Number {
         match self {
             Self::Constant(number) => *number,
             Self::Textured(texture) => texture.colour(uv).luminance(),
+        }
+    }
+
+    /// The mean over the texture plane.
+    pub fn mean(&self) -> f64 {
+        match self {
+            Self::Constant(number) => *number,
+            Self::Textured(texture) => texture.mean().luminance(),
         }
     }
 
