@@ -53,6 +53,8 @@ pub struct Scene {
     pub film: FilmSpec,
     /// Longest path in edges that the scene file asks for.
     pub max_depth: usize,
+    /// Whether the scene file asks that the camera does not see lights themselves.
+    pub hide_emitters: bool,
     /// Fingerprint of the scene: files, parameters, film size.
     pub hash: String,
     vertices: Vec<Vec3>,
