@@ -37,8 +37,9 @@ impl Pictures {
         if let Some(entry) = self.0.borrow().iter().find(|entry| entry.path == path) {
             return Ok(entry.picture.clone());
         }
-        let bytes = std::fs::read(&path)
-            .map_err(|error| name.error(format!("cannot read the image {}: {error}", path.display())))?;
+        let bytes = std::fs::read(&path).map_err(|error| {
+            name.error(format!("cannot read the image {}: {error}{}", path.display(), name.source.looked(name.text)))
+        })?;
         let picture = guard(|| decode(&path, &bytes)).and_then(|result| result);
         let picture = picture
             .map_err(|reason| name.error(format!("the image {} cannot be used: {reason}", path.display())))

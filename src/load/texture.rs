@@ -37,28 +37,16 @@ impl<'a> Plugin<'a> {
     /// The texture in the place of the parameter `name`, nested or by reference; `None` where there is another kind of
     /// value or nothing.
     pub fn texture(&mut self, name: &'static str) -> Result<Option<Arc<Texture>>, LoadError> {
-        if !self.has(name, &["texture", "ref"]) {
+        if !self.has(name, &["texture"]) {
             return Ok(None);
         }
-        self.take(name, &["texture", "ref"])?.map(follow).transpose()?.map(read).transpose()
+        self.take(name, &["texture"])?.map(read).transpose()
     }
 
     /// The one nested texture, whatever its name: what bump and normal maps have.
     pub fn any_texture(&mut self) -> Result<Option<Arc<Texture>>, LoadError> {
         self.object("texture")?.map(read).transpose()
     }
-}
-
-/// The texture that a reference means.
-fn follow(element: Element<'_>) -> Result<Element<'_>, LoadError> {
-    if element.tag() != "ref" {
-        return Ok(element);
-    }
-    let target = element.document.find(element)?;
-    if target.tag() == "texture" {
-        return Ok(target);
-    }
-    Err(element.error(format!("this refers to a <{}>; expected a <texture>", target.tag())))
 }
 
 /// Reads a texture and the image that it names.
@@ -141,7 +129,9 @@ fn to_uv(plugin: &mut Plugin<'_>) -> Result<DAffine2, LoadError> {
 mod tests {
     #![allow(clippy::unwrap_used)]
 
-    use super::super::document::{Document, Source};
+    use super::super::document::Document;
+    use super::super::files::Files;
+    use super::super::source::Source;
     use super::*;
     use crate::image::{Image, WriteOptions};
     use ::image::{Rgb, RgbImage};
@@ -151,11 +141,11 @@ mod tests {
     const ORANGE: [u8; 3] = [255, 128, 10];
 
     fn with<R>(folder: &Path, body: &str, test: impl FnOnce(Plugin<'_>) -> R) -> R {
-        let source = Source { path: folder.join("s.xml"), text: format!("<scene>{body}</scene>") };
-        let tree = source.parse().unwrap();
-        let document = Document::new(&source, &tree, &BTreeMap::new()).unwrap();
-        let last = Element { document: &document, node: tree.root_element().last_element_child().unwrap() };
-        test(Plugin::new(last).unwrap())
+        let text = format!("<scene version=\"3.0.0\">{body}</scene>");
+        let files = Files::read(Source::new(&folder.join("s.xml"), text), &BTreeMap::new()).unwrap();
+        let trees = files.trees().unwrap();
+        let document = Document::new(&files, &trees).unwrap();
+        test(Plugin::new(document.root().children().last().unwrap()).unwrap())
     }
 
     fn colour(folder: &Path, parameter: &str) -> Result<Colour, String> {

@@ -80,6 +80,7 @@ pub struct Builder {
     reliefs: Vec<Option<Relief>>,
     emitters: Vec<Emitter>,
     environment: Option<Spectrum>,
+    hide_emitters: bool,
     hasher: blake3::Hasher,
 }
 
@@ -171,6 +172,11 @@ impl Builder {
         Ok(())
     }
 
+    /// Whether the camera does not see lights themselves.
+    pub fn hide_emitters(&mut self, hide: bool) {
+        self.hide_emitters = hide;
+    }
+
     /// Adds bytes that decide the image to the scene's fingerprint, such as the text of the scene file.
     pub fn fingerprint(&mut self, bytes: &[u8]) {
         self.hasher.update(&(bytes.len() as u64).to_le_bytes());
@@ -205,7 +211,7 @@ impl Builder {
             camera,
             film,
             max_depth,
-            hide_emitters: false,
+            hide_emitters: self.hide_emitters,
             hash: self.hasher.finalize().to_hex()[..32].to_owned(),
             vertices: self.vertices,
             normals: self.normals,
