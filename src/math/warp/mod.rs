@@ -1,6 +1,7 @@
 //! Maps from the unit square to the shapes that paths are sampled on; one file each, with sample, density and
 //! inverse side by side. `sample(invert(x)) = x`, and the density is the inverse of the map's Jacobian.
 
+pub mod cone;
 pub mod disk;
 pub mod hemisphere;
 pub mod sphere;
