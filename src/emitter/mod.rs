@@ -11,6 +11,8 @@ mod panorama;
 mod point;
 mod reach;
 mod spot;
+#[cfg(test)]
+mod tests;
 
 pub use area::{Area, Surface};
 pub use constant::Constant;
