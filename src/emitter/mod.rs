@@ -10,6 +10,7 @@ mod environment;
 mod panorama;
 mod point;
 mod reach;
+pub mod sky;
 mod spot;
 #[cfg(test)]
 mod tests;
