@@ -45,6 +45,9 @@ fn see_light(scene: &Caster<'_>, camera: &[Vertex], heuristic: Heuristic) -> Opt
         }
         _ => return None,
     };
+    if scene.hide_emitters && camera.len() == 2 {
+        return None;
+    }
     let emitter = scene.emitter(id);
     let radiance = emitter.radiance(&start, end.back);
     if radiance.is_black() {
@@ -204,7 +207,7 @@ fn reach_camera(
     let importance = scene.camera.direction_pdf(direction);
     let light_end = end_of(scene, light, -direction, Walk::FromLight)?;
     let value = start.throughput * light_end.value * (importance.0 / distance_squared);
-    if value.is_black() || !scene.visible(light_end.origin, lens) {
+    if value.is_black() || !scene.seen(light_end.origin, start.surface(), lens) {
         return None;
     }
     let normal = match &start.kind {

@@ -123,7 +123,12 @@ fn walk(
     let mut alive = 1.0;
     while path.vertices.len() < vertices {
         let last = path.vertices.len() - 1;
-        let Some(surface) = scene.intersect(walker.origin, walker.direction) else {
+        let first = mode == Walk::FromCamera && last == 0;
+        let found = match first {
+            true => scene.see(walker.origin, walker.direction),
+            false => scene.intersect(walker.origin, walker.direction),
+        };
+        let Some(surface) = found else {
             if let (Walk::FromCamera, Some(id)) = (mode, scene.environment()) {
                 path.vertices.push(environment_vertex(id, &walker));
             }

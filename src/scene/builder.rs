@@ -250,6 +250,7 @@ impl Builder {
             camera,
             film,
             max_depth,
+            hide_emitters: false,
             hash: self.hasher.finalize().to_hex()[..32].to_owned(),
             vertices: self.vertices,
             normals: self.normals,

@@ -57,6 +57,8 @@ pub struct Scene {
     pub film: FilmSpec,
     /// Longest path in edges that the scene file asks for.
     pub max_depth: usize,
+    /// Whether the camera sees through surfaces that shine, and no environment: light shows by what it falls on only.
+    pub hide_emitters: bool,
     /// Fingerprint of the scene: files, parameters, film size.
     pub hash: String,
     vertices: Vec<Vec3>,
