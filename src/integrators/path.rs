@@ -143,7 +143,7 @@ pub(super) fn background(scene: &Caster<'_>, state: &State, pixel: [usize; 2], b
     let Some(id) = scene.environment().filter(|_| !scene.hide_emitters || state.word != Word::EMPTY) else { return };
     let start = Start::Infinite { towards: state.direction };
     let radiance = scene.emitter(id).radiance(&start, -state.direction);
-    let weight = state.pdf.map_or(1.0, |pdf| power(pdf, direct_pdf(scene, id, None, state.direction)));
+    let weight = state.pdf.map_or(1.0, |pdf| power(pdf, direct_pdf(scene, id, &start, state.direction, 1.0)));
     band.add(pixel, state.word.class(), state.throughput * radiance * weight);
 }
 
@@ -158,7 +158,7 @@ pub(super) fn emission(scene: &Caster<'_>, surface: &Surface, state: &State, pix
     }
     let weight = state.pdf.map_or(1.0, |pdf| {
         let distance = surface.position.distance(state.origin.point);
-        power(pdf, direct_pdf(scene, id, Some((surface.geometric, distance)), state.direction))
+        power(pdf, direct_pdf(scene, id, &start, state.direction, distance))
     });
     band.add(pixel, state.word.class(), state.throughput * radiance * weight);
 }

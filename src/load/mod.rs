@@ -6,13 +6,14 @@
 //! - shapes `rectangle`, `cube`, `sphere`, `disk`, `obj`, `ply`;
 //! - bsdfs `diffuse`, `conductor`, `roughconductor`, `dielectric`, `twosided`, nested or by reference;
 //! - textures `bitmap`, `checkerboard`;
-//! - emitters `area`, `constant`, `point`;
+//! - emitters `area`, `constant`, `envmap`, `sunsky` (also `sun`, `sky`), `point`, `spot`, `directional`;
 //! - sensors `perspective`, `thinlens` with an `hdrfilm` and the filters `box`, `tent`, `gaussian`;
 //! - any integrator's `max_depth`; samplers are read over.
 
 mod bsdf;
 mod cie;
 mod document;
+mod emitter;
 mod error;
 mod files;
 mod ior;
@@ -35,7 +36,7 @@ pub use error::{LoadError, Place};
 
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
-use crate::scene::{BsdfId, Builder, FilmSpec, Scene, SceneError, Shine};
+use crate::scene::{BsdfId, Builder, FilmSpec, Scene, SceneError};
 use document::{Document, Element};
 use files::{At, Files};
 use plugin::Plugin;
@@ -144,8 +145,9 @@ impl Reader {
             "bsdf" => bsdf::read(element).map(drop),
             "texture" => texture::read(element).map(drop),
             "emitter" => {
-                let shine = shine(element)?;
-                self.builder.emitter(shine).map_err(|error| element.error(error.to_string()))
+                self.warnings.extend(emitter::caveat(element));
+                let add = |shine| self.builder.emitter(shine).map_err(|error| element.error(error.to_string()));
+                emitter::read(element)?.into_iter().try_for_each(add)
             }
             "shape" => self.shape(element),
             // A sampler, film or filter out here has an id to be found by.
@@ -221,33 +223,6 @@ fn integrator(element: Element<'_>) -> Result<(Option<usize>, bool), LoadError> 
     }
     plugin.ignore_rest();
     Ok((depth, hide_emitters))
-}
-
-/// Reads an emitter that is not a shape.
-fn shine(element: Element<'_>) -> Result<Shine, LoadError> {
-    let mut plugin = Plugin::new(element)?;
-    plugin.ignore(&["sampling_weight"]);
-    let shine = match plugin.kind {
-        "constant" => Shine::Environment(plugin.light("radiance")?),
-        "point" => {
-            let intensity = plugin.light("intensity")?;
-            let (to_world, transform) = plugin.placement()?;
-            let position = match plugin.point("position")? {
-                Some(_) if transform.tag() == "transform" => {
-                    return Err(transform.error("a point emitter with both `position` and `to_world`; expected one"));
-                }
-                Some(position) => position,
-                None => to_world.translation,
-            };
-            Shine::Point(position, intensity)
-        }
-        "area" => {
-            return Err(element.error("an area emitter shines from a shape; expected it inside of a <shape>"));
-        }
-        _ => return Err(plugin.unknown(&["constant", "point", "area (in a shape)"])),
-    };
-    plugin.finish()?;
-    Ok(shine)
 }
 
 /// Runs a parser that was written by others: should it panic, that is an error of the file.

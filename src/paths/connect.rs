@@ -54,7 +54,7 @@ fn see_light(scene: &Caster<'_>, camera: &[Vertex], heuristic: Heuristic) -> Opt
         return None;
     }
     let junction = Junction {
-        camera: scene.start_pdf(id).0,
+        camera: scene.start_pdf(id, &start).0,
         camera_previous: emitted_pdf(emitter, &start, previous, end.back, previous.position - end.position).0,
         ..Junction::default()
     };
@@ -153,7 +153,7 @@ fn join(
         return None;
     }
     let infinite = match &start.kind {
-        VertexKind::Light(_, Start::Infinite { towards }) => Some(*towards),
+        VertexKind::Light(_, Start::Infinite { towards } | Start::Distant { towards }) => Some(*towards),
         _ => None,
     };
     let offset = start.position - end.position;

@@ -77,7 +77,7 @@ pub fn light_vertex(scene: &Caster<'_>, row: Row) -> Option<Vertex> {
     let (id, start, pdf) = scene.sample_start(row)?;
     let position = match start {
         Start::Surface { position, .. } | Start::Point { position } => position,
-        Start::Infinite { .. } => DVec3::ZERO,
+        Start::Infinite { .. } | Start::Distant { .. } => DVec3::ZERO,
     };
     Some(Vertex {
         kind: VertexKind::Light(id, start),

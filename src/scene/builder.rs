@@ -3,7 +3,7 @@
 use super::{BsdfId, EmitterId, Face, Scene, Shape};
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
-use crate::emitter::{Area, Constant, Emitter, Surface};
+use crate::emitter::{Area, Backdrop, Constant, Directional, Emitter, Environment, Point, Reach, Spot, Surface};
 use crate::film::Filter;
 use crate::geometry::{Bvh, Solid, geometric_normal, offset};
 use crate::math::Discrete;
@@ -35,12 +35,35 @@ pub struct FilmSpec {
 }
 
 /// What an emitter of the scene is made from.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Shine {
     /// The same radiance from everywhere outside the scene.
     Environment(Spectrum),
+    /// An image around the scene, a sun, or both. A sun and an image may also come one after the other.
+    Backdrop(Backdrop),
     /// A point light: position, intensity.
     Point(DVec3, Spectrum),
+    /// A spot light.
+    Spot(Spot),
+    /// Parallel light: unit vector towards the source, irradiance.
+    Directional(DVec3, Spectrum),
+}
+
+/// What surrounds the scene.
+enum Surroundings {
+    Constant(Spectrum),
+    Backdrop(Backdrop),
+}
+
+impl Surroundings {
+    /// The emitter for a scene within `reach`, unless it is black.
+    fn emitter(self, reach: Reach) -> Option<Emitter> {
+        match self {
+            Self::Constant(radiance) if radiance.is_black() => None,
+            Self::Constant(radiance) => Some(Emitter::Constant(Constant { radiance, reach })),
+            Self::Backdrop(backdrop) => Environment::new(backdrop, reach).map(Emitter::Environment),
+        }
+    }
 }
 
 /// Why a scene cannot be built.
@@ -79,7 +102,8 @@ pub struct Builder {
     bsdfs: Vec<Bsdf>,
     reliefs: Vec<Option<Relief>>,
     emitters: Vec<Emitter>,
-    environment: Option<Spectrum>,
+    surroundings: Option<Surroundings>,
+    parallel: Vec<(DVec3, Spectrum)>,
     hide_emitters: bool,
     hasher: blake3::Hasher,
 }
@@ -163,11 +187,11 @@ impl Builder {
     /// Adds an emitter that is not a shape.
     pub fn emitter(&mut self, shine: Shine) -> Result<(), SceneError> {
         match shine {
-            Shine::Environment(_) if self.environment.is_some() => return Err(SceneError::TwoEnvironments),
-            Shine::Environment(radiance) => self.environment = Some(radiance),
-            Shine::Point(position, intensity) => {
-                self.emitters.push(Emitter::Point(crate::emitter::Point { position, intensity }));
-            }
+            Shine::Environment(radiance) => return self.surround(Surroundings::Constant(radiance)),
+            Shine::Backdrop(backdrop) => return self.surround(Surroundings::Backdrop(backdrop)),
+            Shine::Point(position, intensity) => self.emitters.push(Emitter::Point(Point { position, intensity })),
+            Shine::Spot(spot) => self.emitters.push(Emitter::Spot(spot)),
+            Shine::Directional(towards, irradiance) => self.parallel.push((towards, irradiance)),
         }
         Ok(())
     }
@@ -175,6 +199,30 @@ impl Builder {
     /// Whether the camera does not see lights themselves.
     pub fn hide_emitters(&mut self, hide: bool) {
         self.hide_emitters = hide;
+    }
+
+    /// Sets what surrounds the scene: once, but a sun and an image behind it may come as two.
+    fn surround(&mut self, new: Surroundings) -> Result<(), SceneError> {
+        self.surroundings = Some(match (self.surroundings.take(), new) {
+            (None, new) => new,
+            (Some(Surroundings::Backdrop(a)), Surroundings::Backdrop(b))
+                if !(a.image.is_some() && b.image.is_some() || a.sun.is_some() && b.sun.is_some()) =>
+            {
+                Surroundings::Backdrop(Backdrop { image: a.image.or(b.image), sun: a.sun.or(b.sun) })
+            }
+            _ => return Err(SceneError::TwoEnvironments),
+        });
+        Ok(())
+    }
+
+    /// Adds what surrounds a scene within `reach`, and says which emitter rays see that leave the scene.
+    fn far_emitters(&mut self, reach: Reach) -> Option<EmitterId> {
+        for (towards, irradiance) in std::mem::take(&mut self.parallel) {
+            self.emitters.push(Emitter::Directional(Directional { towards, irradiance, reach }));
+        }
+        let emitter = self.surroundings.take()?.emitter(reach)?;
+        self.emitters.push(emitter);
+        Some(EmitterId(self.emitters.len() as u32 - 1))
     }
 
     /// Adds bytes that decide the image to the scene's fingerprint, such as the text of the scene file.
@@ -199,13 +247,10 @@ impl Builder {
     pub fn build(mut self, camera: Camera, film: FilmSpec, max_depth: usize) -> Result<Scene, SceneError> {
         let bvh = Bvh::build(&self.vertices, &self.triangles, &self.solids);
         let faces = self.triangles.iter().map(|triangle| self.face(triangle)).collect();
-        let environment = self.environment.filter(|radiance| !radiance.is_black()).map(|radiance| {
-            let (center, radius) = bvh.bounds().bounding_sphere();
-            // A margin for rounding; an empty scene has an environment too.
-            let radius = if radius > 0.0 { radius * (1.0 + 1e-6) } else { 1.0 };
-            self.emitters.push(Emitter::Constant(Constant { radiance, center, radius }));
-            EmitterId(self.emitters.len() as u32 - 1)
-        });
+        let (center, radius) = bvh.bounds().bounding_sphere();
+        // A margin for rounding; an empty scene has an environment too.
+        let radius = if radius > 0.0 { radius * (1.0 + 1e-6) } else { 1.0 };
+        let environment = self.far_emitters(Reach { center, radius });
         let powers: Vec<f64> = self.emitters.iter().map(Emitter::power).collect();
         Ok(Scene {
             camera,

@@ -181,10 +181,10 @@ impl Scene {
         Some((EmitterId(index as u32), start, AreaPdf(pdf.0 * lights.pdf(index))))
     }
 
-    /// Density of [`Scene::sample_start`] for any start on the emitter `id`.
+    /// Density with which [`Scene::sample_start`] finds `start` on the emitter `id`.
     #[inline]
-    pub fn start_pdf(&self, id: EmitterId) -> AreaPdf {
+    pub fn start_pdf(&self, id: EmitterId, start: &Start) -> AreaPdf {
         let choice = self.lights.as_ref().map_or(0.0, |lights| lights.pdf(id.0 as usize));
-        AreaPdf(self.emitter(id).start_pdf().0 * choice)
+        AreaPdf(self.emitter(id).start_pdf(start).0 * choice)
     }
 }
