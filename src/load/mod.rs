@@ -24,7 +24,9 @@ mod picture;
 mod plugin;
 mod ply;
 mod references;
+mod round;
 mod sensor;
+mod serialized;
 mod shape;
 mod source;
 mod spectral;
@@ -39,6 +41,7 @@ use crate::camera::Camera;
 use crate::scene::{BsdfId, Builder, FilmSpec, Scene, SceneError};
 use document::{Document, Element};
 use files::{At, Files};
+use glam::DAffine3;
 use plugin::Plugin;
 use shape::Form;
 use source::Source;
@@ -51,6 +54,9 @@ pub const UNBOUNDED_DEPTH: usize = 65;
 
 /// Largest `max_depth` that a scene may ask for.
 pub const LARGEST_DEPTH: usize = 4096;
+
+/// Most triangles of a scene: instances of instances would fill any memory.
+const MOST_TRIANGLES: usize = 1 << 28;
 
 const TAGS: [&str; 7] = ["default", "integrator", "sensor", "texture", "bsdf", "emitter", "shape"];
 
@@ -117,6 +123,7 @@ struct Reader {
     sensor: Option<(Camera, FilmSpec)>,
     max_depth: Option<usize>,
     shapes: usize,
+    triangles: usize,
     /// Scattering models in use, by node and by whether they are turned over.
     bsdfs: HashMap<(Option<At>, bool), BsdfId>,
     warnings: Vec<String>,
@@ -166,12 +173,26 @@ impl Reader {
     }
 
     fn shape(&mut self, element: Element<'_>) -> Result<(), LoadError> {
-        let shape = shape::read(element)?;
+        for (member, to_world) in shape::members(element)? {
+            self.member(member, &to_world)?;
+        }
+        Ok(())
+    }
+
+    /// Adds a shape that `to_world` places once more.
+    fn member(&mut self, element: Element<'_>, to_world: &DAffine3) -> Result<(), LoadError> {
+        let shape = shape::read(element, to_world)?;
         let bsdf = self.bsdf(shape.bsdf, shape.turned)?;
         if let Some(bytes) = &shape.file {
             self.builder.fingerprint(bytes);
         }
         self.shapes += 1;
+        if let Form::Mesh(mesh) = &shape.form {
+            self.triangles += mesh.triangles.len();
+        }
+        if self.triangles > MOST_TRIANGLES {
+            return Err(element.error(format!("with this shape the scene has more than {MOST_TRIANGLES} triangles")));
+        }
         let added = match shape.form {
             Form::Mesh(mesh) => self.builder.mesh(mesh, bsdf, shape.radiance),
             Form::Solid(solid) => self.builder.solid(solid, bsdf, shape.radiance),
