@@ -25,6 +25,7 @@ fn camera(origin: DVec3, towards: DVec3, half: f64) -> Camera {
         axes: Frame::around(towards.normalize()),
         size: [SIZE, SIZE],
         half: DVec2::splat(half),
+        center: DVec2::ZERO,
         lens_radius: 0.0,
         focus_distance: 1.0,
     }

@@ -13,8 +13,8 @@ fn read(version: &str, body: &str) -> Result<Loaded, String> {
     let folder = tempfile::tempdir().unwrap();
     let mut image = Image::new(4, 3);
     let samples = [
-        1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 2.0, 1.0, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 20.0, 8.0, 9.0, 0.2, 1.0,
-        0.0, 3.0, 3.0, 3.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 0.0, 0.0, 5.0,
+        1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 2.0, 1.0, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 20.0, 8.0, 9.0, 0.2,
+        1.0, 0.0, 3.0, 3.0, 3.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 0.0, 0.0, 5.0,
     ];
     image.colour.iter_mut().zip(samples).for_each(|(to, from)| *to = from);
     image.write(&folder.path().join("e.exr"), &WriteOptions::default()).unwrap();

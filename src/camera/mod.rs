@@ -17,6 +17,8 @@ pub struct Camera {
     pub size: [usize; 2],
     /// Tangents of half the horizontal and half the vertical field of view.
     pub half: DVec2,
+    /// Where the middle of the film lies in the plane at distance 1; zero for a camera that looks straight ahead.
+    pub center: DVec2,
     /// Radius of the lens, 0 for a pinhole.
     pub lens_radius: f64,
     /// Distance to the plane in focus, positive.
@@ -37,8 +39,8 @@ impl Camera {
     /// Direction of the ray from the point `lens` through the film position `film`.
     #[inline]
     pub fn direction(&self, lens: DVec3, film: DVec2) -> DVec3 {
-        let x = (1.0 - 2.0 * film.x / self.size[0] as f64) * self.half.x;
-        let y = (1.0 - 2.0 * film.y / self.size[1] as f64) * self.half.y;
+        let x = (1.0 - 2.0 * film.x / self.size[0] as f64) * self.half.x + self.center.x;
+        let y = (1.0 - 2.0 * film.y / self.size[1] as f64) * self.half.y + self.center.y;
         let through_center = self.axes.to_world(DVec3::new(x, y, 1.0));
         if self.lens_radius == 0.0 {
             return through_center.normalize();
@@ -54,8 +56,8 @@ impl Camera {
             return None;
         }
         let offset = self.axes.to_local(lens - self.origin) / self.focus_distance;
-        let x = local.x / local.z + offset.x;
-        let y = local.y / local.z + offset.y;
+        let x = local.x / local.z + offset.x - self.center.x;
+        let y = local.y / local.z + offset.y - self.center.y;
         let film = DVec2::new(
             0.5 * (1.0 - x / self.half.x) * self.size[0] as f64,
             0.5 * (1.0 - y / self.half.y) * self.size[1] as f64,
@@ -92,6 +94,7 @@ mod tests {
             axes: Frame::around(DVec3::new(0.2, -0.5, 0.7).normalize()),
             size: [64, 32],
             half: DVec2::new(0.6, 0.3),
+            center: DVec2::new(-0.1, 0.2),
             lens_radius,
             focus_distance: 2.5,
         }

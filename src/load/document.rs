@@ -1,152 +1,146 @@
-//! The scene file as a tree of elements whose `$parameters` are replaced and whose ids are known.
+//! A scene as a tree of elements, over all the files that it is made of, whose ids are known.
 
-use super::error::{LoadError, Place};
+use super::error::{LoadError, one_of};
+use super::files::{At, Files};
 use super::picture::Pictures;
+use super::references;
+use super::source::Source;
 use super::value::Text;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
-use std::path::{Path, PathBuf};
+use std::collections::HashMap;
 
 pub(super) type Node<'a> = roxmltree::Node<'a, 'a>;
 
-/// The text of a scene file.
-pub(super) struct Source {
-    pub path: PathBuf,
-    pub text: String,
-}
+/// The tree of a file.
+pub(super) type Tree<'a> = roxmltree::Document<'a>;
 
-impl Source {
-    /// Reads the file at `path`, which must be UTF-8 text.
-    pub fn read(path: &Path) -> Result<Self, LoadError> {
-        let bytes =
-            std::fs::read(path).map_err(|e| LoadError::whole(path, format!("cannot read the scene file: {e}")))?;
-        String::from_utf8(bytes).map(|text| Self { path: path.to_owned(), text }).map_err(|error| {
-            let at = error.utf8_error().valid_up_to();
-            let text = String::from_utf8_lossy(error.as_bytes()).into_owned();
-            Self { path: path.to_owned(), text }.error(at, "this is not UTF-8 text; expected a scene in XML")
-        })
-    }
+/// Tags that say something about the file, and not about the scene.
+const ASIDE: [&str; 3] = ["default", "path", "alias"];
 
-    /// An error at the byte `offset`.
-    pub fn error(&self, offset: usize, message: impl Into<String>) -> LoadError {
-        let place = Some(Place::at(&self.text, offset));
-        LoadError { place, ..LoadError::whole(&self.path, message) }
-    }
-
-    /// The tree of the file's elements.
-    pub fn parse(&self) -> Result<roxmltree::Document<'_>, LoadError> {
-        roxmltree::Document::parse(&self.text).map_err(|error| {
-            let position = error.pos();
-            let line_start: usize = self.text.split_inclusive('\n').take(position.row as usize - 1).map(str::len).sum();
-            let rest = self.text.get(line_start..).unwrap_or_default();
-            let in_line: usize = rest.chars().take(position.col as usize - 1).map(char::len_utf8).sum();
-            self.error(line_start + in_line, format!("not well-formed XML: {error}"))
-        })
-    }
-
-    /// The path that `name` means in this file.
-    pub fn beside(&self, name: &str) -> PathBuf {
-        self.path.parent().unwrap_or(Path::new("")).join(name)
-    }
-}
-
-/// A scene file with its parameters and ids.
+/// A scene with its parameters and ids.
 pub(super) struct Document<'a> {
-    pub source: &'a Source,
-    /// Values of the attributes that contain parameters, by their offset in the text.
-    replaced: HashMap<usize, String>,
-    ids: HashMap<String, Node<'a>>,
+    files: &'a Files,
+    trees: &'a [Tree<'a>],
+    /// Whether a file is in the format of Mitsuba 0.5 and 0.6.
+    legacy: Vec<bool>,
+    ids: HashMap<String, (usize, Node<'a>)>,
     /// Images that its textures show.
     pub pictures: Pictures,
 }
 
 impl<'a> Document<'a> {
-    /// Replaces parameters in the order of the document, as Mitsuba does: an override wins over every `<default>`, and
-    /// the first `<default>` over later ones.
-    pub fn new(
-        source: &'a Source,
-        tree: &'a roxmltree::Document<'a>,
-        overrides: &BTreeMap<String, String>,
-    ) -> Result<Self, LoadError> {
+    /// The scene in `files`, of which `trees` has the trees in the same order.
+    pub fn new(files: &'a Files, trees: &'a [Tree<'a>]) -> Result<Self, LoadError> {
         let mut document =
-            Self { source, replaced: HashMap::new(), ids: HashMap::new(), pictures: Pictures::default() };
-        let mut parameters = overrides.clone();
-        let mut used = BTreeSet::new();
-        for node in tree.root_element().descendants().filter(Node::is_element) {
-            for attribute in node.attributes().filter(|attribute| attribute.value().contains('$')) {
-                let text = replace(attribute.value(), &parameters, &mut used)
-                    .map_err(|name| source.error(attribute.range_value().start, undefined(name, &parameters)))?;
-                document.replaced.insert(attribute.range_value().start, text);
+            Self { files, trees, legacy: vec![false; trees.len()], ids: HashMap::new(), pictures: Pictures::default() };
+        document.versions()?;
+        for (file, tree) in trees.iter().enumerate() {
+            for node in tree.root_element().descendants().filter(Node::is_element) {
+                document.register(file, node)?;
             }
-            document.register(node, &mut parameters)?;
         }
-        match overrides.keys().find(|name| !used.contains(*name)) {
-            Some(name) => Err(LoadError::whole(&source.path, unused(name, &used))),
-            None => Ok(document),
-        }
+        document.aliases()?;
+        references::check(&document)?;
+        Ok(document)
     }
 
-    /// Notes what `node` defines: a parameter or an id.
-    fn register(&mut self, node: Node<'a>, parameters: &mut BTreeMap<String, String>) -> Result<(), LoadError> {
-        let element = Element { document: &*self, node };
-        if element.tag() == "default" {
-            element.only(&["name", "value"])?;
-            let value = element.required("value")?.text.to_owned();
-            parameters.entry(element.required("name")?.text.to_owned()).or_insert(value);
-            return Ok(());
+    /// The outermost element of the scene file.
+    pub fn root(&self) -> Element<'_> {
+        self.root_of(0)
+    }
+
+    fn root_of(&self, file: usize) -> Element<'_> {
+        Element { document: self, file, node: self.trees[file].root_element() }
+    }
+
+    /// Takes the versions of the files; a file without one has that of the file that includes it.
+    fn versions(&mut self) -> Result<(), LoadError> {
+        for (file, tree) in self.trees.iter().enumerate() {
+            let root = Element { document: &*self, file, node: tree.root_element() };
+            let legacy = match root.attribute("version") {
+                Some(version) => is_legacy(version)?,
+                None => self
+                    .files
+                    .included
+                    .iter()
+                    .find(|(_, inner)| **inner == file)
+                    .is_some_and(|((outer, _), _)| self.legacy[*outer]),
+            };
+            self.legacy[file] = legacy;
         }
-        let Some(id) = element.attribute("id").filter(|_| element.tag() != "ref") else {
+        Ok(())
+    }
+
+    /// Notes the id of `node`.
+    fn register(&mut self, file: usize, node: Node<'a>) -> Result<(), LoadError> {
+        let element = Element { document: &*self, file, node };
+        let Some(id) = element.attribute("id").filter(|_| !["ref", "alias"].contains(&element.tag())) else {
             return Ok(());
         };
         let (name, offset) = (id.text.to_owned(), id.offset);
-        match self.ids.insert(name.clone(), node) {
-            Some(_) => Err(self.source.error(offset, format!("the id `{name}` is given twice"))),
+        match self.ids.insert(name.clone(), (file, node)) {
+            Some(_) => Err(self.files.sources[file].error(offset, format!("the id `{name}` is given twice"))),
             None => Ok(()),
         }
     }
 
+    /// Notes the other names that `<alias id="a" as="b"/>` gives.
+    fn aliases(&mut self) -> Result<(), LoadError> {
+        for (file, tree) in self.trees.iter().enumerate() {
+            let is_alias = |node: &Node<'_>| node.is_element() && node.tag_name().name() == "alias";
+            for node in tree.root_element().descendants().filter(is_alias) {
+                let alias = Element { document: &*self, file, node };
+                alias.only(&["id", "as"])?;
+                let (id, new) = (alias.required("id")?, alias.required("as")?);
+                let Some(target) = self.ids.get(id.text).copied() else { return Err(unknown(&id)) };
+                let (name, offset) = (new.text.to_owned(), new.offset);
+                if self.ids.insert(name.clone(), target).is_some() {
+                    return Err(self.files.sources[file].error(offset, format!("the id `{name}` is given twice")));
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// The element with the id that `reference` names.
-    pub fn find(&'a self, reference: Element<'a>) -> Result<Element<'a>, LoadError> {
+    pub fn find<'d>(&'d self, reference: Element<'d>) -> Result<Element<'d>, LoadError> {
         reference.only(&["id", "name"])?;
         let id = reference.required("id")?;
         match self.ids.get(id.text) {
-            Some(node) => Ok(Element { document: self, node: *node }),
-            None => Err(id.error(format!("nothing in this file has the id `{}`", id.text))),
+            Some((file, node)) => Ok(Element { document: self, file: *file, node: *node }),
+            None => Err(unknown(&id)),
         }
     }
-}
 
-fn undefined(name: &str, parameters: &BTreeMap<String, String>) -> String {
-    let known: Vec<_> = parameters.keys().map(|name| format!("${name}")).collect();
-    format!("the parameter `${name}` has no <default> before this place; expected {}", super::error::one_of(&known))
-}
-
-fn unused(name: &str, used: &BTreeSet<String>) -> String {
-    let known: Vec<_> = used.iter().collect();
-    format!("nothing in this file uses the parameter `{name}`; expected {}", super::error::one_of(&known))
-}
-
-/// Replaces each `$name` in `text`; the name that is not defined otherwise.
-fn replace<'t>(
-    text: &'t str,
-    parameters: &BTreeMap<String, String>,
-    used: &mut BTreeSet<String>,
-) -> Result<String, &'t str> {
-    let mut pieces = text.split('$');
-    let mut result = pieces.next().unwrap_or_default().to_owned();
-    for piece in pieces {
-        let end = piece.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(piece.len());
-        let (name, rest) = piece.split_at(end);
-        result.push_str(parameters.get(name).ok_or(name)?);
-        result.push_str(rest);
-        used.insert(name.to_owned());
+    /// All elements, file by file.
+    pub fn elements(&self) -> impl Iterator<Item = Element<'_>> {
+        let of_file = move |(file, tree)| {
+            let tree: &Tree<'_> = tree;
+            let nodes = tree.root_element().descendants().filter(Node::is_element);
+            nodes.map(move |node| Element { document: self, file, node })
+        };
+        self.trees.iter().enumerate().flat_map(of_file)
     }
-    Ok(result)
 }
 
-/// An element of a scene file.
+fn unknown(id: &Text<'_>) -> LoadError {
+    id.error(format!("nothing in this file has the id `{}`", id.text))
+}
+
+/// Whether `version` is that of a format before Mitsuba 2.
+fn is_legacy(version: Text<'_>) -> Result<bool, LoadError> {
+    let mut numbers = version.text.split('.').map(|number| number.parse::<u32>().ok());
+    match (numbers.next().flatten(), numbers.next()) {
+        (Some(0), Some(Some(4..=9))) | (Some(1), _) => Ok(true),
+        (Some(2 | 3), _) => Ok(false),
+        _ => Err(version.error(format!("scene format {} is not supported; expected 0.4 to 3", version.shown()))),
+    }
+}
+
+/// An element of a scene.
 #[derive(Clone, Copy)]
 pub(super) struct Element<'a> {
     pub document: &'a Document<'a>,
+    file: usize,
     pub node: Node<'a>,
 }
 
@@ -156,18 +150,51 @@ impl<'a> Element<'a> {
         self.node.tag_name().name()
     }
 
-    /// The elements inside, without definitions of parameters.
+    /// What tells it from all other elements.
+    pub fn key(self) -> At {
+        (self.file, self.node.range().start)
+    }
+
+    /// Whether it stands in a file of Mitsuba 0.5 or 0.6.
+    pub fn is_legacy(self) -> bool {
+        self.document.legacy[self.file]
+    }
+
+    fn source(self) -> &'a Source {
+        &self.document.files.sources[self.file]
+    }
+
+    /// The elements inside, with those of included files in their places, without definitions of parameters.
     pub fn children(self) -> impl Iterator<Item = Element<'a>> {
-        let elements = self.node.children().filter(|node| node.is_element() && node.tag_name().name() != "default");
-        elements.map(move |node| Element { document: self.document, node })
+        let mut children = Vec::new();
+        self.collect(&mut children);
+        children.into_iter()
+    }
+
+    fn collect(self, children: &mut Vec<Element<'a>>) {
+        for node in self.node.children().filter(|node| node.is_element()) {
+            let child = Element { node, ..self };
+            match child.included() {
+                // The files of a scene are a tree, so this ends.
+                Some(root) if root.tag() == "scene" => root.collect(children),
+                Some(root) => children.push(root),
+                None if ASIDE.contains(&child.tag()) => {}
+                None => children.push(child),
+            }
+        }
+    }
+
+    /// The outermost element of the file that this `<include>` means.
+    pub fn included(self) -> Option<Element<'a>> {
+        self.document.files.included.get(&self.key()).map(|file| self.document.root_of(*file))
     }
 
     /// The attribute `name` with its parameters replaced.
     pub fn attribute(self, name: &str) -> Option<Text<'a>> {
         let attribute = self.node.attribute_node(name)?;
         let offset = attribute.range_value().start;
-        let text = self.document.replaced.get(&offset).map_or(attribute.value(), String::as_str);
-        Some(Text { text: text.trim(), offset, source: self.document.source })
+        let text = self.document.files.replaced.get(&(self.file, offset)).map_or(attribute.value(), String::as_str);
+        Some(Text { text: text.trim(), offset, source: self.source() })
     }
 
     /// The attribute `name`, or an error that it is missing.
@@ -180,29 +207,33 @@ impl<'a> Element<'a> {
         match self.node.attributes().find(|attribute| !names.contains(&attribute.name())) {
             None => Ok(()),
             Some(odd) => {
-                let expected = super::error::one_of(names);
+                let expected = one_of(names);
                 let message = format!("unexpected attribute `{}` in <{}>; expected {expected}", odd.name(), self.tag());
-                Err(self.document.source.error(odd.range().start, message))
+                Err(self.source().error(odd.range().start, message))
             }
         }
     }
 
     /// An error at the start of this element.
     pub fn error(self, message: impl Into<String>) -> LoadError {
-        self.document.source.error(self.node.range().start, message)
+        self.source().error(self.node.range().start, message)
+    }
+
+    /// A warning about this element: its place and the message on one line.
+    pub fn warning(self, message: impl Into<String>) -> String {
+        self.error(message).to_string().lines().next().unwrap_or_default().to_owned()
     }
 }
 
+/// Runs a test on the outermost element of a scene file at `path` with the given text.
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn parameters_are_replaced_by_their_longest_name() {
-        let parameters = BTreeMap::from([("w".to_owned(), "1".to_owned()), ("wx".to_owned(), "2".to_owned())]);
-        let mut used = BTreeSet::new();
-        assert_eq!(replace("$wx $w.5", &parameters, &mut used).as_deref(), Ok("2 1.5"));
-        assert_eq!(replace("a $v", &parameters, &mut used), Err("v"));
-        assert_eq!(used.len(), 2);
-    }
+pub(super) fn with_root<R>(
+    path: &std::path::Path,
+    text: &str,
+    test: impl FnOnce(Element<'_>) -> R,
+) -> Result<R, LoadError> {
+    let files = Files::read(Source::new(path, text.to_owned()), &std::collections::BTreeMap::new())?;
+    let trees = files.trees()?;
+    let document = Document::new(&files, &trees)?;
+    Ok(test(document.root()))
 }

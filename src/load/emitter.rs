@@ -40,14 +40,8 @@ pub(super) fn read(element: Element<'_>) -> Result<Vec<Shine>, LoadError> {
 
 /// What the user should know about an emitter that has been read.
 pub(super) fn caveat(element: Element<'_>) -> Option<String> {
-    let newer = ["sunsky", "sun"].contains(&element.attribute("type")?.text) && !older(element);
-    newer.then(|| "the sun of `sunsky` follows Mitsuba 0.6, where it is up to 30 % darker than in Mitsuba 3".to_owned())
-}
-
-/// Whether the file is for Mitsuba 0.6 or older, in whose worlds +y is up.
-fn older(element: Element<'_>) -> bool {
-    let root = Element { node: element.node.document().root_element(), ..element };
-    root.attribute("version").is_some_and(|version| version.text.starts_with("0."))
+    let newer = ["sunsky", "sun"].contains(&element.attribute("type")?.text) && !element.is_legacy();
+    newer.then(|| element.warning("the sun here is that of Mitsuba 0.6, up to 30 % darker than Mitsuba 3's"))
 }
 
 fn point(plugin: &mut Plugin<'_>) -> Result<Shine, LoadError> {
@@ -127,14 +121,14 @@ fn sun_and_sky(plugin: &mut Plugin<'_>) -> Result<Vec<Shine>, LoadError> {
     let own = rotation(plugin)?;
     // Mitsuba 3 has +x in the south and +y in the west, which is a mirror image of the world.
     let upright = DMat3::from_cols(-DVec3::Y, DVec3::Z, DVec3::X);
-    let rotation = if older(plugin.element) { own } else { own * upright };
+    let rotation = if plugin.element.is_legacy() { own } else { own * upright };
     let range = |low: f64, high: f64| move |value: &f64| (low..=high).contains(value);
     let turbidity = plugin.float("turbidity")?.map(|t| t.check(range(1.0, 10.0), "1 to 10")).transpose()?;
     let stretch = plugin.float("stretch")?.map(|s| s.check(range(1.0, 2.0), "1 to 2")).transpose()?;
     let sky = Sky {
         towards: towards(plugin, &rotation)?,
         turbidity: turbidity.unwrap_or(3.0),
-        albedo: plugin.share("albedo", if older(plugin.element) { 0.2 } else { 0.3 })?,
+        albedo: plugin.share("albedo", if plugin.element.is_legacy() { 0.2 } else { 0.3 })?,
         stretch: stretch.unwrap_or(1.0),
     };
     let whole = scale(plugin, "scale", 1.0)?;

@@ -11,17 +11,23 @@
 //! - any integrator's `max_depth`; samplers are read over.
 
 mod bsdf;
+mod cie;
 mod document;
 mod emitter;
 mod error;
+mod files;
 mod ior;
+mod legacy;
 mod mesh;
 mod obj;
 mod picture;
 mod plugin;
 mod ply;
+mod references;
 mod sensor;
 mod shape;
+mod source;
+mod spectral;
 mod texture;
 mod transform;
 mod value;
@@ -31,9 +37,11 @@ pub use error::{LoadError, Place};
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::scene::{BsdfId, Builder, FilmSpec, Scene, SceneError};
-use document::{Document, Element, Source};
+use document::{Document, Element};
+use files::{At, Files};
 use plugin::Plugin;
 use shape::Form;
+use source::Source;
 use std::collections::{BTreeMap, HashMap};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -45,6 +53,9 @@ pub const UNBOUNDED_DEPTH: usize = 65;
 pub const LARGEST_DEPTH: usize = 4096;
 
 const TAGS: [&str; 7] = ["default", "integrator", "sensor", "texture", "bsdf", "emitter", "shape"];
+
+/// Tags of Mitsuba's that change the image and that are not understood.
+const UNSUPPORTED: [&str; 4] = ["medium", "volume", "phase", "subsurface"];
 
 /// What the caller changes about a scene.
 #[derive(Clone, Debug, Default)]
@@ -68,18 +79,21 @@ pub struct Loaded {
 /// # Errors
 /// Whatever the file has that is not understood, with its place; files that cannot be read.
 pub fn read(path: &Path, options: &Options) -> Result<Loaded, LoadError> {
-    let source = Source::read(path)?;
+    let main = Source::read(path)?;
     if let Some(size) = options.size {
         sensor::check_size(size).map_err(|message| LoadError::whole(path, message))?;
     }
-    let tree = source.parse()?;
-    let document = Document::new(&source, &tree, &options.overrides)?;
+    let files = Files::read(main, &options.overrides)?;
+    let trees = files.trees()?;
+    let document = Document::new(&files, &trees)?;
     let mut reader = Reader { size: options.size, ..Reader::default() };
-    reader.builder.fingerprint(source.text.as_bytes());
+    for source in &files.sources {
+        reader.builder.fingerprint(source.text.as_bytes());
+    }
     for text in options.overrides.iter().flat_map(|(name, value)| [name, value]) {
         reader.builder.fingerprint(text.as_bytes());
     }
-    let root = Element { document: &document, node: tree.root_element() };
+    let root = document.root();
     check_root(root)?;
     for element in root.children() {
         reader.element(element)?;
@@ -91,12 +105,8 @@ fn check_root(root: Element<'_>) -> Result<(), LoadError> {
     if root.tag() != "scene" {
         return Err(root.error(format!("found <{}>; expected <scene version=\"3.0.0\">", root.tag())));
     }
-    root.only(&["version"])?;
-    let version = root.required("version")?;
-    match version.text.split('.').next() {
-        Some("2" | "3") => Ok(()),
-        _ => Err(version.error(format!("scene format {} is not supported; expected 2 or 3", version.shown()))),
-    }
+    root.only(&["version", "type", "id"])?;
+    root.required("version").map(drop)
 }
 
 /// What has been read of a scene so far.
@@ -108,7 +118,7 @@ struct Reader {
     max_depth: Option<usize>,
     shapes: usize,
     /// Scattering models in use, by node and by whether they are turned over.
-    bsdfs: HashMap<(Option<roxmltree::NodeId>, bool), BsdfId>,
+    bsdfs: HashMap<(Option<At>, bool), BsdfId>,
     warnings: Vec<String>,
 }
 
@@ -118,7 +128,9 @@ impl Reader {
         match element.tag() {
             "integrator" if self.max_depth.is_some() => Err(element.error("a scene can have one integrator only")),
             "integrator" => {
-                self.max_depth = Some(max_depth(element)?);
+                let (depth, hide_emitters) = integrator(element)?;
+                self.max_depth = Some(depth.unwrap_or(UNBOUNDED_DEPTH));
+                self.builder.hide_emitters(hide_emitters);
                 Ok(())
             }
             "sensor" => {
@@ -131,13 +143,20 @@ impl Reader {
             }
             // Models that no shape refers to are checked, and then left out.
             "bsdf" => bsdf::read(element).map(drop),
-            "texture" => texture::read(element).map(drop),
             "emitter" => {
                 self.warnings.extend(emitter::caveat(element));
                 let add = |shine| self.builder.emitter(shine).map_err(|error| element.error(error.to_string()));
                 emitter::read(element)?.into_iter().try_for_each(add)
             }
             "shape" => self.shape(element),
+            // Textures are read where they are used. A sampler, film or filter out here has an id to be found by.
+            "texture" | "sampler" | "film" | "rfilter" => Ok(()),
+            // Other programs keep their settings in files of Mitsuba 0.5 and 0.6.
+            other if element.is_legacy() && !UNSUPPORTED.contains(&other) => {
+                let message = format!("<{other}> is not an element of a scene and is read over");
+                self.warnings.push(element.warning(message));
+                Ok(())
+            }
             other => {
                 let expected = error::one_of(&TAGS);
                 Err(element.error(format!("unexpected <{other}> in the scene; expected {expected}")))
@@ -161,7 +180,7 @@ impl Reader {
 
     /// The model of `element`, added to the scene when it is first used; a grey one where there is none.
     fn bsdf(&mut self, element: Option<Element<'_>>, turned: bool) -> Result<BsdfId, LoadError> {
-        let key = (element.map(|element| element.node.id()), turned);
+        let key = (element.map(Element::key), turned);
         if let Some(id) = self.bsdfs.get(&key) {
             return Ok(*id);
         }
@@ -187,19 +206,22 @@ impl Reader {
     }
 }
 
-/// The bound on the length of paths, in edges, that an integrator of any kind sets.
-fn max_depth(element: Element<'_>) -> Result<usize, LoadError> {
+/// The bound on the length of paths, in edges, that an integrator of any kind sets, or one that it holds; and whether
+/// lights themselves are invisible. All else chooses between estimators of the same image, or divides work.
+fn integrator(element: Element<'_>) -> Result<(Option<usize>, bool), LoadError> {
     let mut plugin = Plugin::new(element)?;
     let depth = plugin.integer("max_depth")?;
     let allowed = |depth: &i64| *depth == -1 || (1..=LARGEST_DEPTH as i64).contains(depth);
     let depth = depth.map(|d| d.check(allowed, &format!("-1 (no bound) or 1 to {LARGEST_DEPTH}"))).transpose()?;
-    if plugin.boolean("hide_emitters")? {
-        return Err(element.error("`hide_emitters` is not supported; expected false"));
+    let mut depth = depth.map(|depth| usize::try_from(depth).unwrap_or(UNBOUNDED_DEPTH));
+    let mut hide_emitters = plugin.boolean("hide_emitters")?;
+    for inner in plugin.objects("integrator")? {
+        let (inner_depth, hides) = integrator(inner)?;
+        depth = depth.or(inner_depth);
+        hide_emitters |= hides;
     }
-    // These choose between estimators of the same image, or how work is divided.
-    plugin.ignore(&["rr_depth", "samples_per_pass", "timeout", "block_size", "emitter_samples", "bsdf_samples"]);
-    plugin.finish()?;
-    Ok(depth.and_then(|depth| usize::try_from(depth).ok()).unwrap_or(UNBOUNDED_DEPTH))
+    plugin.ignore_rest();
+    Ok((depth, hide_emitters))
 }
 
 /// Runs a parser that was written by others: should it panic, that is an error of the file.

@@ -3,23 +3,39 @@
 
 use super::document::Element;
 use super::error::{LoadError, one_of};
+use super::legacy;
+use super::spectral::{self, Meaning};
 use super::transform;
 use super::value::Text;
 use crate::spectrum::Spectrum;
 use glam::{DAffine3, DVec3};
+use std::borrow::Cow;
 use std::collections::HashSet;
 
-/// Linear Rec.709 of a spectrum that is one at all wavelengths: XYZ = (1, 1, 1).
-const EQUAL_ENERGY: Spectrum = Spectrum::rgb(1.204_794, 0.948_291, 0.908_916);
+/// Attributes of a plugin element; a file's outermost one has a version too.
+const ATTRIBUTES: [&str; 4] = ["type", "id", "name", "version"];
 
 /// A plugin element.
 pub(super) struct Plugin<'a> {
     pub element: Element<'a>,
     /// The `type` attribute.
     pub kind: &'a str,
-    children: Vec<Element<'a>>,
+    children: Vec<Child<'a>>,
     /// What was asked for, to say what was expected.
     asked: Vec<String>,
+}
+
+/// A parameter or a nested plugin.
+struct Child<'a> {
+    element: Element<'a>,
+    /// Its name as Mitsuba 3 spells it.
+    name: Option<Cow<'a, str>>,
+}
+
+impl Child<'_> {
+    fn is_named(&self, name: &str) -> bool {
+        self.name.as_deref() == Some(name)
+    }
 }
 
 /// A value and where it stands.
@@ -47,14 +63,20 @@ impl<'a, T> Parameter<'a, T> {
 impl<'a> Plugin<'a> {
     /// Opens a plugin element.
     pub fn new(element: Element<'a>) -> Result<Self, LoadError> {
-        element.only(&["type", "id", "name"])?;
+        let is_file = element.node.parent_element().is_none();
+        element.only(&ATTRIBUTES[..if is_file { 4 } else { 3 }])?;
         let kind = element.required("type")?.text;
-        let children: Vec<_> = element.children().collect();
         let mut names = HashSet::new();
-        for name in children.iter().filter_map(|child| child.attribute("name")) {
-            if !names.insert(name.text) {
-                return Err(name.error(format!("the parameter `{}` is given twice", name.text)));
+        let mut children = Vec::new();
+        for child in element.children() {
+            let given = child.attribute("name");
+            let name = given.map(|given| legacy::name(child, kind, given.text));
+            if let (Some(given), Some(name)) = (given, &name)
+                && !names.insert(name.clone())
+            {
+                return Err(given.error(format!("the parameter `{}` is given twice", given.text)));
             }
+            children.push(Child { element: child, name });
         }
         Ok(Self { element, kind, children, asked: Vec::new() })
     }
@@ -70,19 +92,28 @@ impl<'a> Plugin<'a> {
         self.element.error(format!("{} `{}` lacks the parameter `{name}`", self.element.tag(), self.kind))
     }
 
-    /// Takes the parameter `name`, which must be one of `tags`.
+    /// Whether the parameter `name` is there and is one of `tags`; a reference is `ref` or what it refers to.
+    pub fn has(&self, name: &str, tags: &[&str]) -> bool {
+        let mut named = self.children.iter().filter(|child| child.is_named(name));
+        named.any(|Child { element, .. }| {
+            tags.contains(&element.tag()) || follow(*element).is_ok_and(|target| tags.contains(&target.tag()))
+        })
+    }
+
+    /// Takes the parameter `name`, which must be one of `tags`; references are followed, unless `tags` has `ref`.
     pub(super) fn take(&mut self, name: &str, tags: &[&str]) -> Result<Option<Element<'a>>, LoadError> {
         self.asked.push(name.to_owned());
-        let named = |child: &Element<'_>| child.attribute("name").is_some_and(|text| text.text == name);
-        let Some(index) = self.children.iter().position(named) else {
+        let Some(index) = self.children.iter().position(|child| child.is_named(name)) else {
             return Ok(None);
         };
-        let element = self.children.remove(index);
-        if tags.contains(&element.tag()) {
-            return Ok(Some(element));
+        let element = self.children.remove(index).element;
+        let found = if tags.contains(&"ref") { element } else { follow(element)? };
+        if tags.contains(&found.tag()) {
+            return Ok(Some(found));
         }
         let expected: Vec<_> = tags.iter().map(|tag| format!("<{tag}>")).collect();
-        Err(element.error(format!("`{name}` is a <{}>; expected {}", element.tag(), one_of(&expected))))
+        let given = element.attribute("name").map_or(name, |given| given.text);
+        Err(element.error(format!("`{given}` is a <{}>; expected {}", found.tag(), one_of(&expected))))
     }
 
     fn scalar<T>(
@@ -95,7 +126,8 @@ impl<'a> Plugin<'a> {
             return Ok(None);
         };
         element.only(&["name", "value"])?;
-        Ok(Some(Parameter { value: read(element.required("value")?)?, name, element }))
+        let value = read(element.required("value")?)?;
+        Ok(Some(Parameter { value, name: element.attribute("name").map_or(name, |given| given.text), element }))
     }
 
     /// A finite number.
@@ -160,62 +192,49 @@ impl<'a> Plugin<'a> {
         }
     }
 
-    /// Whether the parameter `name` is there and is one of `tags`.
-    pub fn has(&self, name: &str, tags: &[&str]) -> bool {
-        let named = |child: &Element<'_>| child.attribute("name").is_some_and(|text| text.text == name);
-        self.children.iter().any(|child| named(child) && tags.contains(&child.tag()))
-    }
-
-    /// A colour where a spectrum that is constant stands for grey: reflectances and refractive indices.
+    /// A colour where a spectrum that is constant stands for grey: refractive indices.
     pub fn colour(&mut self, name: &'static str) -> Result<Option<Parameter<'a, Spectrum>>, LoadError> {
-        self.spectrum(name, Spectrum::ONE)
+        self.spectrum(name, Meaning::Index)
     }
 
-    /// A share of light: a colour with channels from 0 to 1, 1 where it is not given.
+    /// A share of light: a colour with channels from 0 to 1, `default` where it is not given.
     pub fn share(&mut self, name: &'static str, default: f64) -> Result<Spectrum, LoadError> {
         let in_range = |colour: &Spectrum| colour.to_rgb().iter().all(|channel| (0.0..=1.0).contains(channel));
-        let colour = self.colour(name)?.map(|colour| colour.check(in_range, "values from 0 to 1")).transpose()?;
+        let colour = self.spectrum(name, Meaning::Share)?;
+        let colour = colour.map(|colour| colour.check(in_range, "values from 0 to 1")).transpose()?;
         Ok(colour.unwrap_or(Spectrum::grey(default)))
     }
 
     /// Emitted light, 1 where it is not given. A `<spectrum>` that is constant has the colour of equal energy at all
-    /// wavelengths, as in Mitsuba's RGB modes; a `<float>` is grey.
+    /// wavelengths, as in Mitsuba's RGB modes; a `<float>` is grey, and so was a spectrum in Mitsuba 0.6.
     pub fn light(&mut self, name: &'static str) -> Result<Spectrum, LoadError> {
         let valid = |colour: &Spectrum| colour.is_valid();
-        let light = self.spectrum(name, EQUAL_ENERGY)?;
+        let light = self.spectrum(name, Meaning::Light)?;
         Ok(light.map(|light| light.check(valid, "values of at least 0")).transpose()?.unwrap_or(Spectrum::ONE))
     }
 
-    fn spectrum(&mut self, name: &'static str, white: Spectrum) -> Result<Option<Parameter<'a, Spectrum>>, LoadError> {
-        let Some(element) = self.take(name, &["rgb", "spectrum", "float"])? else {
+    fn spectrum(&mut self, name: &'static str, meaning: Meaning) -> Result<Option<Parameter<'a, Spectrum>>, LoadError> {
+        let legacy_tags = ["rgb", "spectrum", "float", "integer", "srgb", "blackbody"];
+        let Some(element) = self.take(name, &legacy_tags[..if self.element.is_legacy() { 6 } else { 3 }])? else {
             return Ok(None);
         };
-        element.only(&["name", "value"])?;
-        let text = element.required("value")?;
-        let value = match element.tag() {
-            "rgb" => text.colour()?,
-            "spectrum" => white * text.constant_spectrum()?,
-            _ => Spectrum::grey(text.number()?),
-        };
-        Ok(Some(Parameter { value, name, element }))
+        let value = spectral::read(element, meaning)?;
+        Ok(Some(Parameter { value, name: element.attribute("name").map_or(name, |given| given.text), element }))
     }
 
-    /// Takes all nested elements `tag`; references are followed.
+    /// Takes all nested elements `tag`; references to such elements are followed.
     pub fn objects(&mut self, tag: &str) -> Result<Vec<Element<'a>>, LoadError> {
         self.asked.push(format!("<{tag}>"));
-        let (mine, rest) = self.children.drain(..).partition(|child| [tag, "ref"].contains(&child.tag()));
+        let mut found = Vec::new();
+        let mut rest = Vec::new();
+        for child in self.children.drain(..) {
+            match follow(child.element)? {
+                target if target.tag() == tag => found.push(target),
+                _ => rest.push(child),
+            }
+        }
         self.children = rest;
-        let follow = |child: Element<'a>| {
-            if child.tag() != "ref" {
-                return Ok(child);
-            }
-            let target = child.document.find(child)?;
-            if target.tag() == tag {
-                return Ok(target);
-            }
-            Err(child.error(format!("this refers to a <{}>; expected a <{tag}>", target.tag())))
-        };
-        Vec::into_iter(mine).map(follow).collect()
+        Ok(found)
     }
 
     /// Takes the nested element `tag`, if there is one.
@@ -230,15 +249,24 @@ impl<'a> Plugin<'a> {
 
     /// Drops parameters that cannot change the image.
     pub fn ignore(&mut self, names: &[&str]) {
-        let harmless = |child: &Element<'_>| child.attribute("name").is_some_and(|name| names.contains(&name.text));
-        self.children.retain(|child| !harmless(child));
+        self.children.retain(|child| !names.iter().any(|name| child.is_named(name)));
+    }
+
+    /// Drops everything: what nobody asked for does not matter here.
+    pub fn ignore_rest(&mut self) {
+        self.children.clear();
     }
 
     /// Refuses what nobody asked for.
     pub fn finish(self) -> Result<(), LoadError> {
-        let Some(child) = self.children.first() else {
+        let Some(Child { element: child, .. }) = self.children.first() else {
             return Ok(());
         };
+        let target = follow(*child)?;
+        if child.tag() == "ref" {
+            let message = format!("this refers to a <{}>; expected {}", target.tag(), one_of(&self.asked));
+            return Err(child.error(message));
+        }
         let found = match child.attribute("name") {
             Some(name) => format!("parameter `{}`", name.text),
             None => format!("<{}>", child.tag()),
@@ -246,4 +274,9 @@ impl<'a> Plugin<'a> {
         let (tag, kind, expected) = (self.element.tag(), self.kind, one_of(&self.asked));
         Err(child.error(format!("unreferenced {found} in {tag} `{kind}`; expected {expected}")))
     }
+}
+
+/// The element that a reference means; any other element itself.
+fn follow(element: Element<'_>) -> Result<Element<'_>, LoadError> {
+    if element.tag() == "ref" { element.document.find(element) } else { Ok(element) }
 }

@@ -27,11 +27,18 @@ pub(super) fn read(element: Element<'_>, size: Option<[usize; 2]>) -> Result<(Ca
         return Err(plugin.unknown(&KINDS));
     }
     plugin.objects("sampler")?;
-    let mut film = plugin.object("film")?.map_or(Ok(default_film()), film)?;
-    film.size = size.unwrap_or(film.size);
+    let Film { whole, crop, filter } = plugin.object("film")?.map_or(Ok(Film::default()), film)?;
     let (to_world, transform) = plugin.placement()?;
-    let half = half_extent(&mut plugin, film.size)?;
-    plugin.ignore(&["near_clip", "shutter_open", "shutter_close"]);
+    let is_whole = crop.size == whole;
+    let whole = size.filter(|_| is_whole).unwrap_or(whole);
+    let crop = if is_whole { Crop { offset: [0, 0], size: whole } } else { crop };
+    let (mut half, center) = window(&mut plugin, whole, crop)?;
+    let size = size.unwrap_or(crop.size);
+    if !is_whole {
+        // A cropped film that is given another size keeps its width in the scene.
+        half.y = half.x * size[1] as f64 / size[0] as f64;
+    }
+    plugin.ignore(&["near_clip", "shutter_open", "shutter_close", "srf", "x_fov"]);
     // Mitsuba focuses at the far clipping plane where nothing else is said.
     let far_clip = plugin.positive("far_clip")?.unwrap_or(1e4);
     let focus_distance = plugin.positive("focus_distance")?.unwrap_or(far_clip);
@@ -46,7 +53,8 @@ pub(super) fn read(element: Element<'_>, size: Option<[usize; 2]>) -> Result<(Ca
     let axes = axes(&to_world).ok_or_else(|| {
         transform.error("the axes of this camera are not at right angles; expected a `to_world` without shear")
     })?;
-    Ok((Camera { origin: to_world.translation, axes, size: film.size, half, lens_radius, focus_distance }, film))
+    let camera = Camera { origin: to_world.translation, axes, size, half, center, lens_radius, focus_distance };
+    Ok((camera, FilmSpec { size, filter }))
 }
 
 /// Orthonormal axes of a camera. Scale is left aside; left-handed axes stay left-handed.
@@ -61,12 +69,28 @@ fn axes(to_world: &DAffine3) -> Option<Frame> {
     Some(Frame { tangent: tangent * tangent.dot(x).signum(), bitangent, normal: z })
 }
 
+/// Half the extents, and the middle, of the cropped film in the plane at distance 1.
+fn window(plugin: &mut Plugin<'_>, whole: [usize; 2], crop: Crop) -> Result<(DVec2, DVec2), LoadError> {
+    let half = half_extent(plugin, whole)?;
+    // In parts of the film, to the right and down.
+    let principal = ["principal_point_offset_x", "principal_point_offset_y"].map(|name| plugin.number(name, 0.0));
+    let [x, y] = principal;
+    let vector = |size: [usize; 2]| DVec2::new(size[0] as f64, size[1] as f64);
+    let share = vector(crop.size) / vector(whole);
+    let middle = vector(crop.offset) / vector(whole) + 0.5 * share;
+    Ok((half * share, half * (DVec2::ONE - 2.0 * middle - 2.0 * DVec2::new(x?, y?))))
+}
+
 /// Tangents of half the fields of view along x and y.
 fn half_extent(plugin: &mut Plugin<'_>, size: [usize; 2]) -> Result<DVec2, LoadError> {
+    let aspect = size[0] as f64 / size[1] as f64;
+    let along_diagonal = DVec2::new(aspect, 1.0).normalize();
+    if plugin.has("focal_length", &["string"]) || !plugin.has("fov", &["float", "integer"]) {
+        return Ok(along_diagonal * focal_length(plugin)?);
+    }
     let fov = plugin.float("fov")?.ok_or_else(|| plugin.lacks("fov"))?;
     let fov = fov.check(|fov| *fov > 0.0 && *fov < 180.0, "an angle between 0 and 180 degrees")?;
     let tangent = (0.5 * fov.to_radians()).tan();
-    let aspect = size[0] as f64 / size[1] as f64;
     let (along_x, along_y) = (DVec2::new(tangent, tangent / aspect), DVec2::new(tangent * aspect, tangent));
     let Some(axis) = plugin.string("fov_axis")? else {
         return Ok(along_x);
@@ -76,33 +100,84 @@ fn half_extent(plugin: &mut Plugin<'_>, size: [usize; 2]) -> Result<DVec2, LoadE
         "y" => Ok(along_y),
         "smaller" => Ok(if aspect > 1.0 { along_y } else { along_x }),
         "larger" => Ok(if aspect > 1.0 { along_x } else { along_y }),
-        "diagonal" => Ok(DVec2::new(aspect, 1.0).normalize() * tangent),
+        "diagonal" => Ok(along_diagonal * tangent),
         _ => Err(axis.refuse("one of x, y, diagonal, smaller, larger")),
     }
 }
 
-fn default_film() -> FilmSpec {
-    FilmSpec { size: DEFAULT_SIZE.map(|pixels| pixels as usize), filter: Filter::Gaussian { stddev: 0.5 } }
+/// Tangent of half the diagonal field of view of a lens on film of 35 mm.
+fn focal_length(plugin: &mut Plugin<'_>) -> Result<f64, LoadError> {
+    // Only for its kind: what is not a number has been found to be missing.
+    if let Some(fov) = plugin.float("fov")? {
+        return Err(fov.refuse("either `fov` or `focal_length`"));
+    }
+    let length = plugin.string("focal_length")?;
+    let millimetres = match &length {
+        None => 50.0,
+        Some(length) => {
+            let text = length.value.text.trim_end_matches("mm").trim();
+            let valid = |number: &f64| number.is_finite() && *number > 0.0;
+            text.parse().ok().filter(valid).ok_or_else(|| length.refuse("a length above 0 such as 50mm"))?
+        }
+    };
+    Ok(0.5 * 36f64.hypot(24.0) / millimetres)
 }
 
-fn film(element: Element<'_>) -> Result<FilmSpec, LoadError> {
+/// What a film element says.
+struct Film {
+    /// Width and height in pixels without the crop.
+    whole: [usize; 2],
+    crop: Crop,
+    filter: Filter,
+}
+
+/// The part of a film that is rendered.
+#[derive(Clone, Copy)]
+struct Crop {
+    /// Its top left corner in pixels.
+    offset: [usize; 2],
+    size: [usize; 2],
+}
+
+impl Default for Film {
+    fn default() -> Self {
+        let whole = DEFAULT_SIZE.map(|pixels| pixels as usize);
+        Self { whole, crop: Crop { offset: [0, 0], size: whole }, filter: Filter::Gaussian { stddev: 0.5 } }
+    }
+}
+
+fn film(element: Element<'_>) -> Result<Film, LoadError> {
     let mut plugin = Plugin::new(element)?;
-    if plugin.kind != "hdrfilm" {
-        return Err(plugin.unknown(&["hdrfilm"]));
+    let kinds = ["hdrfilm", "ldrfilm", "mfilm"];
+    let known = &kinds[..if element.is_legacy() { 3 } else { 1 }];
+    if !known.contains(&plugin.kind) {
+        return Err(plugin.unknown(known));
     }
     // How the image is written is decided on the command line.
     plugin.ignore(&["file_format", "pixel_format", "component_format", "banner", "filename", "sample_border"]);
-    let mut pixels = |name, default| {
+    plugin.ignore(&["compensate", "high_quality_edges", "attach_log", "gamma", "exposure", "key", "burn", "label"]);
+    plugin.ignore(&["tonemap_method", "has_variance", "digits", "variable", "fov"]);
+    let mut pixels = |name, default, least: i64| {
         let Some(count) = plugin.integer(name)? else {
             return Ok(default);
         };
-        count.check(|count| (1..=MOST[0] as i64).contains(count), &format!("1 to {} pixels", MOST[0]))
+        let bounds = format!("{least} to {} pixels", MOST[0]);
+        count.check(|count| (least..=MOST[0] as i64).contains(count), &bounds).map(|count| count as usize)
     };
-    let size = [pixels("width", DEFAULT_SIZE[0])?, pixels("height", DEFAULT_SIZE[1])?].map(|pixels| pixels as usize);
-    check_size(size).map_err(|message| element.error(message))?;
-    let filter = plugin.object("rfilter")?.map_or(Ok(default_film().filter), filter)?;
+    let [width, height] = Film::default().whole;
+    let whole = [pixels("width", width, 1)?, pixels("height", height, 1)?];
+    let offset = [pixels("crop_offset_x", 0, 0)?, pixels("crop_offset_y", 0, 0)?];
+    let size = [pixels("crop_width", whole[0], 1)?, pixels("crop_height", whole[1], 1)?];
+    check_size(whole).map_err(|message| element.error(message))?;
+    if (0..2).any(|i| offset[i] + size[i] > whole[i]) {
+        return Err(element.error(format!(
+            "the crop of {} × {} pixels at {}, {} leaves the film; expected one inside of {} × {}",
+            size[0], size[1], offset[0], offset[1], whole[0], whole[1]
+        )));
+    }
+    let filter = plugin.object("rfilter")?.map_or(Ok(Film::default().filter), filter)?;
     plugin.finish()?;
-    Ok(FilmSpec { size, filter })
+    Ok(Film { whole, crop: Crop { offset, size }, filter })
 }
 
 /// Refuses films without pixels, and those that would not fit into memory.

@@ -37,28 +37,13 @@ impl<'a> Plugin<'a> {
     /// The texture in the place of the parameter `name`, nested or by reference; `None` where there is another kind of
     /// value or nothing.
     pub fn texture(&mut self, name: &'static str) -> Result<Option<Arc<Texture>>, LoadError> {
-        if !self.has(name, &["texture", "ref"]) {
-            return Ok(None);
-        }
-        self.take(name, &["texture", "ref"])?.map(follow).transpose()?.map(read).transpose()
+        if self.has(name, &["texture"]) { self.take(name, &["texture"])?.map(read).transpose() } else { Ok(None) }
     }
 
     /// The one nested texture, whatever its name: what bump and normal maps have.
     pub fn any_texture(&mut self) -> Result<Option<Arc<Texture>>, LoadError> {
         self.object("texture")?.map(read).transpose()
     }
-}
-
-/// The texture that a reference means.
-fn follow(element: Element<'_>) -> Result<Element<'_>, LoadError> {
-    if element.tag() != "ref" {
-        return Ok(element);
-    }
-    let target = element.document.find(element)?;
-    if target.tag() == "texture" {
-        return Ok(target);
-    }
-    Err(element.error(format!("this refers to a <{}>; expected a <texture>", target.tag())))
 }
 
 /// Reads a texture and the image that it names.
@@ -141,21 +126,18 @@ fn to_uv(plugin: &mut Plugin<'_>) -> Result<DAffine2, LoadError> {
 mod tests {
     #![allow(clippy::unwrap_used)]
 
-    use super::super::document::{Document, Source};
+    use super::super::document::with_root;
     use super::*;
     use crate::image::{Image, WriteOptions};
     use ::image::{Rgb, RgbImage};
-    use std::collections::BTreeMap;
     use std::path::Path;
 
     const ORANGE: [u8; 3] = [255, 128, 10];
 
     fn with<R>(folder: &Path, body: &str, test: impl FnOnce(Plugin<'_>) -> R) -> R {
-        let source = Source { path: folder.join("s.xml"), text: format!("<scene>{body}</scene>") };
-        let tree = source.parse().unwrap();
-        let document = Document::new(&source, &tree, &BTreeMap::new()).unwrap();
-        let last = Element { document: &document, node: tree.root_element().last_element_child().unwrap() };
-        test(Plugin::new(last).unwrap())
+        let text = format!("<scene version=\"3.0.0\">{body}</scene>");
+        let last = |root: Element<'_>| test(Plugin::new(root.children().last().unwrap()).unwrap());
+        with_root(&folder.join("s.xml"), &text, last).unwrap()
     }
 
     fn colour(folder: &Path, parameter: &str) -> Result<Colour, String> {

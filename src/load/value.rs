@@ -1,7 +1,7 @@
 //! Numbers, vectors and colours as the scene format writes them.
 
-use super::document::Source;
 use super::error::LoadError;
+use super::source::Source;
 use crate::spectrum::Spectrum;
 use glam::DVec3;
 
@@ -80,13 +80,6 @@ impl Text<'_> {
         let [_, r, g, b] = code.ok_or_else(|| self.expected("#RRGGBB in hexadecimal digits"))?.to_be_bytes();
         Ok(Spectrum::rgb(r.into(), g.into(), b.into()) / 255.0)
     }
-
-    /// The value of a spectrum that is the same at all wavelengths.
-    pub fn constant_spectrum(&self) -> Result<f64, LoadError> {
-        number(self.text).ok_or_else(|| {
-            self.expected("one finite number (spectra that vary over the wavelength are not supported yet; use <rgb>)")
-        })
-    }
 }
 
 fn number(word: &str) -> Option<f64> {
@@ -100,7 +93,7 @@ mod tests {
     use super::*;
 
     fn with<R>(text: &str, read: impl FnOnce(Text<'_>) -> R) -> R {
-        let source = Source { path: "x".into(), text: text.to_owned() };
+        let source = Source::new("x".as_ref(), text.to_owned());
         read(Text { text: &source.text, offset: 0, source: &source })
     }
 

@@ -104,6 +104,7 @@ pub struct Builder {
     emitters: Vec<Emitter>,
     surroundings: Option<Surroundings>,
     parallel: Vec<(DVec3, Spectrum)>,
+    hide_emitters: bool,
     hasher: blake3::Hasher,
 }
 
@@ -219,6 +220,11 @@ impl Builder {
         Some(EmitterId(self.emitters.len() as u32 - 1))
     }
 
+    /// Whether the camera does not see lights themselves.
+    pub fn hide_emitters(&mut self, hide: bool) {
+        self.hide_emitters = hide;
+    }
+
     /// Adds bytes that decide the image to the scene's fingerprint, such as the text of the scene file.
     pub fn fingerprint(&mut self, bytes: &[u8]) {
         self.hasher.update(&(bytes.len() as u64).to_le_bytes());
@@ -250,7 +256,7 @@ impl Builder {
             camera,
             film,
             max_depth,
-            hide_emitters: false,
+            hide_emitters: self.hide_emitters,
             hash: self.hasher.finalize().to_hex()[..32].to_owned(),
             vertices: self.vertices,
             normals: self.normals,
