@@ -149,8 +149,8 @@ impl Reader {
                 emitter::read(element)?.into_iter().try_for_each(add)
             }
             "shape" => self.shape(element),
-            // Textures are read where they are used. A sampler, film or filter out here has an id to be found by.
-            "texture" | "sampler" | "film" | "rfilter" => Ok(()),
+            // A sampler, film or filter out here has an id to be found by.
+            "sampler" | "film" | "rfilter" => Ok(()),
             // Other programs keep their settings in files of Mitsuba 0.5 and 0.6.
             other if element.is_legacy() && !UNSUPPORTED.contains(&other) => {
                 let message = format!("<{other}> is not an element of a scene and is read over");

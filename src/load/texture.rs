@@ -37,7 +37,10 @@ impl<'a> Plugin<'a> {
     /// The texture in the place of the parameter `name`, nested or by reference; `None` where there is another kind of
     /// value or nothing.
     pub fn texture(&mut self, name: &'static str) -> Result<Option<Arc<Texture>>, LoadError> {
-        if self.has(name, &["texture"]) { self.take(name, &["texture"])?.map(read).transpose() } else { Ok(None) }
+        if !self.has(name, &["texture"]) {
+            return Ok(None);
+        }
+        self.take(name, &["texture"])?.map(read).transpose()
     }
 
     /// The one nested texture, whatever its name: what bump and normal maps have.
