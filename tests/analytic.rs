@@ -99,7 +99,7 @@ fn a_glowing_room_is_a_geometric_series() {
     let (reflectance, max_depth) = (0.5, 5);
     let mut builder = Builder::new();
     let paint = builder.bsdf(diffuse(reflectance));
-    builder.mesh(room(), paint, Some(Spectrum::ONE)).unwrap();
+    builder.mesh(room(), paint, Some(Spectrum::ONE.into())).unwrap();
     // Off the corners: there a photon gather's disk reaches past the wall.
     let scene = build(builder, camera(DVec3::new(0.1, 0.2, 0.0), DVec3::new(0.05, 0.02, 1.0), 0.3), max_depth);
     for method in METHODS {
@@ -156,7 +156,7 @@ fn a_sphere_light_has_its_form_factor() {
     builder.solid(Solid::disk(DVec3::ZERO, DVec3::Z, 10.0), paint, None).unwrap();
     let black = builder.bsdf(diffuse(0.0));
     let lamp = Solid::sphere(DVec3::new(0.0, 0.0, 3.0), 1.0);
-    builder.solid(lamp, black, Some(Spectrum::grey(4.0))).unwrap();
+    builder.solid(lamp, black, Some(Spectrum::grey(4.0).into())).unwrap();
     // Below the sphere, as the camera must not block or see it.
     let scene = build(builder, camera(DVec3::new(0.0, 0.0, 1.0), -DVec3::Z, 1e-3), 3);
     for method in METHODS {
@@ -206,7 +206,7 @@ fn a_lamp_under_glass_is_dimmed_by_the_squared_index() {
     let mut builder = Builder::new();
     let black = builder.bsdf(diffuse(0.0));
     let lamp = Solid::disk(DVec3::ZERO, DVec3::Z, 1.0);
-    builder.solid(lamp, black, Some(Spectrum::grey(3.0))).unwrap();
+    builder.solid(lamp, black, Some(Spectrum::grey(3.0).into())).unwrap();
     let glass = builder.bsdf(Bsdf::Dielectric(Dielectric {
         eta: 1.5,
         specular_reflectance: Spectrum::ONE,
@@ -245,7 +245,7 @@ fn the_unbiased_methods_agree_class_by_class() {
     }
     let black = builder.bsdf(diffuse(0.0));
     let lamp = Solid::disk(DVec3::new(0.0, 0.99, 0.0), -DVec3::Y, 0.4);
-    builder.solid(lamp, black, Some(Spectrum::grey(10.0))).unwrap();
+    builder.solid(lamp, black, Some(Spectrum::grey(10.0).into())).unwrap();
     let scene = build(builder, camera(DVec3::new(0.0, -0.2, -0.9), DVec3::new(0.0, -0.5, 1.0), 0.6), 6);
     let classes = ["LDE", "LSE", "LDDE", "LDSE", "LSDE", "LDDDE", "LSSDE", "LDSSE", "LDDDDE"];
     let values = |image: &Image| -> Vec<f64> {

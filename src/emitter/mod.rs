@@ -26,7 +26,7 @@ pub use spot::Spot;
 
 use crate::math::{AreaPdf, Row, SolidAnglePdf};
 use crate::spectrum::Spectrum;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 /// Where light starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +37,8 @@ pub enum Start {
         position: DVec3,
         /// Unit normal on the shining side.
         normal: DVec3,
+        /// Texture coordinates.
+        uv: DVec2,
     },
     /// At an isolated point, which no ray can hit.
     Point {
@@ -104,7 +106,7 @@ impl Emitter {
     #[inline]
     pub fn radiance(&self, start: &Start, direction: DVec3) -> Spectrum {
         match (self, start) {
-            (Self::Area(area), Start::Surface { normal, .. }) => area.radiance(normal.dot(direction)),
+            (Self::Area(area), Start::Surface { normal, uv, .. }) => area.radiance(*uv, normal.dot(direction)),
             (Self::Constant(constant), _) => constant.radiance,
             (Self::Environment(environment), Start::Infinite { towards }) => environment.radiance(*towards),
             (Self::Point(point), _) => point.intensity,
@@ -119,7 +121,9 @@ impl Emitter {
     #[inline]
     pub fn emit(&self, start: &Start, row: Row) -> Option<(DVec3, DVec3, Spectrum)> {
         match (self, start) {
-            (Self::Area(area), Start::Surface { position, normal }) => Some(area.emit(*position, *normal, row)),
+            (Self::Area(area), Start::Surface { position, normal, uv }) => {
+                Some(area.emit(*position, *normal, *uv, row))
+            }
             (Self::Constant(constant), Start::Infinite { towards }) => Some(constant.emit(*towards, row)),
             (Self::Environment(environment), Start::Infinite { towards }) => Some(environment.emit(*towards, row)),
             (Self::Point(point), Start::Point { position }) => Some(point.emit(*position, row)),

@@ -41,7 +41,7 @@ pub(super) fn read(element: Element<'_>) -> Result<Vec<Shine>, LoadError> {
 /// What the user should know about an emitter that has been read.
 pub(super) fn caveat(element: Element<'_>) -> Option<String> {
     let newer = ["sunsky", "sun"].contains(&element.attribute("type")?.text) && !element.is_legacy();
-    newer.then(|| "the sun of `sunsky` follows Mitsuba 0.6, where it is up to 30 % darker than in Mitsuba 3".to_owned())
+    newer.then(|| element.warning("the sun here is that of Mitsuba 0.6, up to 30 % darker than Mitsuba 3's"))
 }
 
 fn point(plugin: &mut Plugin<'_>) -> Result<Shine, LoadError> {

@@ -2,6 +2,7 @@
 
 use super::error::LoadError;
 use super::guard;
+use super::source::read_bounded;
 use super::value::Text;
 use crate::image::Image;
 use crate::scene::Builder;
@@ -15,7 +16,7 @@ use std::sync::Arc;
 /// Most pixels along an axis.
 const MOST: u32 = 1 << 16;
 
-/// Most bytes that a decoder may ask for.
+/// Most bytes of a file, and most that a decoder may ask for.
 const MOST_BYTES: u64 = 1 << 32;
 
 const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
@@ -37,8 +38,9 @@ impl Pictures {
         if let Some(entry) = self.0.borrow().iter().find(|entry| entry.path == path) {
             return Ok(entry.picture.clone());
         }
-        let bytes = std::fs::read(&path).map_err(|error| {
-            name.error(format!("cannot read the image {}: {error}{}", path.display(), name.source.looked(name.text)))
+        let bytes = read_bounded(&path, MOST_BYTES).map_err(|reason| {
+            let looked = name.source.looked(name.text);
+            name.error(format!("cannot read the image {}: {reason}{looked}", path.display()))
         })?;
         let picture = guard(|| decode(&path, &bytes)).and_then(|result| result);
         let picture = picture

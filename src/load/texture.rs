@@ -129,23 +129,18 @@ fn to_uv(plugin: &mut Plugin<'_>) -> Result<DAffine2, LoadError> {
 mod tests {
     #![allow(clippy::unwrap_used)]
 
-    use super::super::document::Document;
-    use super::super::files::Files;
-    use super::super::source::Source;
+    use super::super::document::with_root;
     use super::*;
     use crate::image::{Image, WriteOptions};
     use ::image::{Rgb, RgbImage};
-    use std::collections::BTreeMap;
     use std::path::Path;
 
     const ORANGE: [u8; 3] = [255, 128, 10];
 
     fn with<R>(folder: &Path, body: &str, test: impl FnOnce(Plugin<'_>) -> R) -> R {
         let text = format!("<scene version=\"3.0.0\">{body}</scene>");
-        let files = Files::read(Source::new(&folder.join("s.xml"), text), &BTreeMap::new()).unwrap();
-        let trees = files.trees().unwrap();
-        let document = Document::new(&files, &trees).unwrap();
-        test(Plugin::new(document.root().children().last().unwrap()).unwrap())
+        let last = |root: Element<'_>| test(Plugin::new(root.children().last().unwrap()).unwrap());
+        with_root(&folder.join("s.xml"), &text, last).unwrap()
     }
 
     fn colour(folder: &Path, parameter: &str) -> Result<Colour, String> {

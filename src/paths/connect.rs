@@ -41,7 +41,7 @@ fn see_light(scene: &Caster<'_>, camera: &[Vertex], heuristic: Heuristic) -> Opt
     let (id, start) = match &end.kind {
         VertexKind::Environment(id) => (*id, Start::Infinite { towards: -end.back }),
         VertexKind::Surface(surface) => {
-            (surface.emitter?, Start::Surface { position: end.position, normal: surface.geometric })
+            (surface.emitter?, Start::Surface { position: end.position, normal: surface.geometric, uv: surface.uv })
         }
         _ => return None,
     };

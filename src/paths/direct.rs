@@ -43,7 +43,7 @@ pub fn sample_direct(scene: &Caster<'_>, position: DVec3, row: Row) -> Option<Di
             let offset = at - position;
             (offset.normalize(), Some(at), None, 1.0 / (pdf.0 * offset.length_squared()))
         }
-        Start::Surface { position: at, normal } => {
+        Start::Surface { position: at, normal, .. } => {
             let offset = at - position;
             let distance_squared = offset.length_squared();
             let direction = offset / distance_squared.sqrt();

@@ -8,7 +8,7 @@ use crate::film::Filter;
 use crate::geometry::{Bvh, Solid, geometric_normal, offset};
 use crate::math::Discrete;
 use crate::spectrum::Spectrum;
-use crate::texture::Relief;
+use crate::texture::{Colour, Relief};
 use glam::{DVec3, Vec2, Vec3};
 use thiserror::Error;
 
@@ -127,7 +127,7 @@ impl Builder {
     }
 
     /// Adds a mesh, which shines with `radiance` where one is given.
-    pub fn mesh(&mut self, mesh: Mesh, bsdf: BsdfId, radiance: Option<Spectrum>) -> Result<(), SceneError> {
+    pub fn mesh(&mut self, mesh: Mesh, bsdf: BsdfId, radiance: Option<Colour>) -> Result<(), SceneError> {
         if !mesh.positions.iter().chain(&mesh.normals).all(|v| v.is_finite()) {
             return Err(SceneError::NotFinite);
         }
@@ -139,7 +139,15 @@ impl Builder {
             let [a, b, c] = triangle.map(|i| mesh.positions[i as usize].as_dvec3());
             let normals = triangle.iter().filter_map(|i| mesh.normals.get(*i as usize));
             let towards = normals.sum::<Vec3>().as_dvec3();
-            if (b - a).cross(c - a).dot(towards) < 0.0 { [a, c, b] } else { [a, b, c] }
+            // Without texture coordinates, barycentric ones stand in, as in `Scene::triangle_surface`.
+            let [ua, ub, uc] = match mesh.uvs.is_empty() {
+                true => [Vec2::ZERO, Vec2::X, Vec2::Y],
+                false => triangle.map(|i| mesh.uvs.get(i as usize).copied().unwrap_or_default()),
+            };
+            match (b - a).cross(c - a).dot(towards) < 0.0 {
+                true => ([a, c, b], [ua, uc, ub]),
+                false => ([a, b, c], [ua, ub, uc]),
+            }
         };
         let surface = |()| Surface::triangles(mesh.triangles.iter().map(corners));
         let shape = self.shape(bsdf, radiance, !mesh.uvs.is_empty(), surface)?;
@@ -155,7 +163,7 @@ impl Builder {
     }
 
     /// Adds a sphere or a disk, which shines with `radiance` where one is given.
-    pub fn solid(&mut self, solid: Solid, bsdf: BsdfId, radiance: Option<Spectrum>) -> Result<(), SceneError> {
+    pub fn solid(&mut self, solid: Solid, bsdf: BsdfId, radiance: Option<Colour>) -> Result<(), SceneError> {
         let surface = |()| Some(Surface::Solid(solid)).filter(|surface| surface.area() > 0.0);
         let shape = self.shape(bsdf, radiance, true, surface)?;
         self.solids.push(solid);
@@ -166,20 +174,21 @@ impl Builder {
     fn shape(
         &mut self,
         bsdf: BsdfId,
-        radiance: Option<Spectrum>,
+        radiance: Option<Colour>,
         mapped: bool,
         surface: impl FnOnce(()) -> Option<Surface>,
     ) -> Result<u32, SceneError> {
-        let emitter = match radiance.filter(|radiance| !radiance.is_black()) {
+        let oriented = self.reliefs[bsdf.0 as usize].is_some();
+        let mut textured = oriented || !self.bsdfs[bsdf.0 as usize].is_constant();
+        let emitter = match radiance.filter(|radiance| *radiance != Colour::Constant(Spectrum::BLACK)) {
             Some(radiance) => {
                 let surface = surface(()).ok_or(SceneError::NoArea)?;
+                textured |= !radiance.is_constant();
                 self.emitters.push(Emitter::Area(Area::new(radiance, surface)));
                 Some(EmitterId(self.emitters.len() as u32 - 1))
             }
             None => None,
         };
-        let oriented = self.reliefs[bsdf.0 as usize].is_some();
-        let textured = oriented || !self.bsdfs[bsdf.0 as usize].is_constant();
         self.shapes.push(Shape { bsdf, emitter, textured, oriented, mapped });
         Ok(self.shapes.len() as u32 - 1)
     }
@@ -194,11 +203,6 @@ impl Builder {
             Shine::Directional(towards, irradiance) => self.parallel.push((towards, irradiance)),
         }
         Ok(())
-    }
-
-    /// Whether the camera does not see lights themselves.
-    pub fn hide_emitters(&mut self, hide: bool) {
-        self.hide_emitters = hide;
     }
 
     /// Sets what surrounds the scene: once, but a sun and an image behind it may come as two.
@@ -223,6 +227,11 @@ impl Builder {
         let emitter = self.surroundings.take()?.emitter(reach)?;
         self.emitters.push(emitter);
         Some(EmitterId(self.emitters.len() as u32 - 1))
+    }
+
+    /// Whether the camera does not see lights themselves.
+    pub fn hide_emitters(&mut self, hide: bool) {
+        self.hide_emitters = hide;
     }
 
     /// Adds bytes that decide the image to the scene's fingerprint, such as the text of the scene file.
