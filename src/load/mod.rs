@@ -4,7 +4,8 @@
 //! an error that names it and says what is expected. Understood are
 //!
 //! - shapes `rectangle`, `cube`, `sphere`, `disk`, `obj`, `ply`;
-//! - bsdfs `diffuse`, `conductor`, `roughconductor`, `dielectric`, `twosided`, nested or by reference;
+//! - bsdfs `diffuse`, `conductor`, `roughconductor`, `dielectric`, `thindielectric`, `roughdielectric`, `plastic`,
+//!   `roughplastic`, `phong`, `null`, `mask`, `blendbsdf`, `twosided`, nested or by reference;
 //! - emitters `area`, `constant`, `point`;
 //! - sensors `perspective`, `thinlens` with an `hdrfilm` and the filters `box`, `tent`, `gaussian`;
 //! - any integrator's `max_depth`; samplers are read over.
@@ -159,7 +160,10 @@ impl Reader {
         if let Some(id) = self.bsdfs.get(&key) {
             return Ok(*id);
         }
-        let model: Bsdf = element.map_or(Ok(bsdf::default()), bsdf::read)?;
+        let model: Bsdf = match element {
+            Some(element) => bsdf::read(element)?.bsdf,
+            None => bsdf::default(),
+        };
         let id = self.builder.bsdf(if turned { bsdf::turned(model) } else { model });
         self.bsdfs.insert(key, id);
         Ok(id)

@@ -56,6 +56,23 @@ impl From<Spectrum> for Colour {
     }
 }
 
+/// A texture that perturbs the shading frame.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Relief {
+    /// Heights, the luminance of a texture times `scale`.
+    Bump {
+        /// The heights.
+        texture: Arc<Texture>,
+        /// Factor on the heights.
+        scale: f64,
+    },
+    /// Normals in the shading frame, from −1 to 1 as 0 to 1.
+    Normal {
+        /// The normals.
+        texture: Arc<Texture>,
+    },
+}
+
 /// A number that may vary: the luminance of a texture.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Number {
