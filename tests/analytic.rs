@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use glam::{DVec2, DVec3, Vec3};
-use pathblend::bsdf::{Bsdf, Conductor, Dielectric, Diffuse, Distribution, Microfacet, RoughConductor};
+use pathblend::bsdf::{Bsdf, Conductor, Dielectric, Diffuse, Distribution, RoughConductor, Roughness};
 use pathblend::camera::Camera;
 use pathblend::film::Filter;
 use pathblend::geometry::Solid;
@@ -226,17 +226,17 @@ fn the_unbiased_methods_agree_class_by_class() {
     let mut builder = Builder::new();
     let paint = builder.bsdf(diffuse(0.6));
     builder.mesh(room(), paint, None).unwrap();
-    let mirror = Conductor { index: None, specular_reflectance: Spectrum::grey(0.9) };
-    let microfacet = |alpha| Microfacet { distribution: Distribution::Ggx, alpha };
+    let mirror = Conductor { index: None, specular_reflectance: Spectrum::grey(0.9).into() };
+    let roughness = |alpha| Roughness::isotropic(Distribution::Ggx, alpha);
     let bodies = [
         Bsdf::Dielectric(Dielectric {
             eta: 1.5,
             specular_reflectance: Spectrum::ONE,
             specular_transmittance: Spectrum::ONE,
         }),
-        Bsdf::Conductor(mirror),
-        Bsdf::RoughConductor(RoughConductor { metal: mirror, microfacet: microfacet(0.3) }),
-        Bsdf::RoughConductor(RoughConductor { metal: mirror, microfacet: microfacet(0.12) }),
+        Bsdf::Conductor(mirror.clone()),
+        Bsdf::RoughConductor(RoughConductor { metal: mirror.clone(), roughness: roughness(0.3) }),
+        Bsdf::RoughConductor(RoughConductor { metal: mirror.clone(), roughness: roughness(0.12) }),
     ];
     for (i, body) in bodies.into_iter().enumerate() {
         let bsdf = builder.bsdf(body);

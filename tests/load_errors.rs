@@ -28,7 +28,8 @@ const BODIES: [(&str, &str); 68] = [
     // Plugins that do not exist, or not here.
     (
         r#"^<bsdf type="velvet"/>"#,
-        "unknown bsdf `velvet`; expected one of diffuse, conductor, roughconductor, dielectric, twosided",
+        "unknown bsdf `velvet`; expected one of diffuse, conductor, roughconductor, dielectric, thindielectric, roughdielectric, plastic, \
+         roughplastic, phong, null, mask, blendbsdf, twosided, bumpmap, normalmap",
     ),
     (
         r#"^<shape type="helix"/>"#,
@@ -98,8 +99,8 @@ const BODIES: [(&str, &str); 68] = [
         "`distribution` is phong; expected one of beckmann, ggx",
     ),
     (
-        r#"<bsdf type="conductor"><string name="material" value="^Au"/></bsdf>"#,
-        "`material` is Au; expected none: measured metals come later; give `eta` and `k` instead",
+        r#"<bsdf type="conductor"><string name="material" value="^Brass"/></bsdf>"#,
+        "`material` is Brass; expected one of none, Ag, Al,",
     ),
     (r#"<bsdf type="conductor"><rgb name="eta" value="^-1"/></bsdf>"#, "`eta` is -1; expected values of at least 0"),
     (

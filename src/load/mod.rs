@@ -4,7 +4,8 @@
 //! an error that names it and says what is expected. Understood are
 //!
 //! - shapes `rectangle`, `cube`, `sphere`, `disk`, `obj`, `ply`;
-//! - bsdfs `diffuse`, `conductor`, `roughconductor`, `dielectric`, `twosided`, nested or by reference;
+//! - bsdfs `diffuse`, `conductor`, `roughconductor`, `dielectric`, `thindielectric`, `roughdielectric`, `plastic`,
+//!   `roughplastic`, `phong`, `null`, `mask`, `blendbsdf`, `twosided`, nested or by reference;
 //! - textures `bitmap`, `checkerboard`;
 //! - emitters `area`, `constant`, `envmap`, `sunsky` (also `sun`, `sky`), `point`, `spot`, `directional`;
 //! - sensors `perspective`, `thinlens` with an `hdrfilm` and the filters `box`, `tent`, `gaussian`;
@@ -36,9 +37,9 @@ mod value;
 
 pub use error::{LoadError, Place};
 
-use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::scene::{BsdfId, Builder, FilmSpec, Scene, SceneError};
+use bsdf::Model;
 use document::{Document, Element};
 use files::{At, Files};
 use glam::DAffine3;
@@ -205,8 +206,14 @@ impl Reader {
         if let Some(id) = self.bsdfs.get(&key) {
             return Ok(*id);
         }
-        let model: Bsdf = element.map_or(Ok(bsdf::default()), bsdf::read)?;
-        let id = self.builder.bsdf(if turned { bsdf::turned(model) } else { model });
+        let Model { bsdf, relief } = match element {
+            Some(element) => bsdf::read(element)?,
+            None => Model { bsdf: bsdf::default(), relief: None },
+        };
+        let id = self.builder.bsdf(if turned { bsdf::turned(bsdf) } else { bsdf });
+        if let Some(relief) = relief {
+            self.builder.relief(id, relief);
+        }
         self.bsdfs.insert(key, id);
         Ok(id)
     }
