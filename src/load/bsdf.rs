@@ -112,7 +112,7 @@ impl Reader {
     }
 
     fn blend(&mut self, plugin: &mut Plugin<'_>) -> Result<Blend, LoadError> {
-        if !given(plugin, "weight") {
+        if !plugin.is_given("weight") {
             return Err(plugin.lacks("weight"));
         }
         let weight = plugin.number_texture("weight", 0.5)?;
@@ -265,11 +265,6 @@ fn rough_plastic(plugin: &mut Plugin<'_>) -> Result<RoughPlastic, LoadError> {
 fn reflectances(plugin: &mut Plugin<'_>) -> Result<(Colour, Colour), LoadError> {
     let diffuse = plugin.colour_texture("diffuse_reflectance", 0.5)?;
     Ok((diffuse, plugin.colour_texture("specular_reflectance", 1.0)?))
-}
-
-/// Whether the parameter `name` stands in the file.
-fn given(plugin: &Plugin<'_>, name: &str) -> bool {
-    plugin.element.children().any(|child| child.attribute("name").is_some_and(|text| text.text == name))
 }
 
 #[cfg(test)]
