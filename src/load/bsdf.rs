@@ -3,6 +3,7 @@
 
 mod metals;
 mod microfacet;
+mod principled;
 
 use super::document::Element;
 use super::error::{LoadError, one_of};
@@ -16,7 +17,7 @@ use crate::spectrum::Spectrum;
 use crate::texture::{Colour, Number, Relief, Texture};
 use std::sync::Arc;
 
-const KINDS: [&str; 15] = [
+const KINDS: [&str; 16] = [
     "diffuse",
     "conductor",
     "roughconductor",
@@ -26,6 +27,7 @@ const KINDS: [&str; 15] = [
     "plastic",
     "roughplastic",
     "phong",
+    "principled",
     "null",
     "mask",
     "blendbsdf",
@@ -198,6 +200,7 @@ fn plain(plugin: &mut Plugin<'_>) -> Result<Bsdf, LoadError> {
             specular_reflectance: plugin.colour_texture("specular_reflectance", 0.2)?,
             diffuse_reflectance: plugin.colour_texture("diffuse_reflectance", 0.5)?,
         }),
+        "principled" => Bsdf::Principled(Box::new(principled::principled(plugin)?)),
         "null" => Bsdf::Null,
         _ => return Err(plugin.unknown(&KINDS)),
     })
