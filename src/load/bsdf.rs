@@ -3,6 +3,7 @@
 
 mod metals;
 mod microfacet;
+mod principled;
 
 use super::document::Element;
 use super::error::{LoadError, one_of};
@@ -15,7 +16,7 @@ use crate::bsdf::{
 use crate::spectrum::Spectrum;
 use crate::texture::{Colour, Relief};
 
-const KINDS: [&str; 15] = [
+const KINDS: [&str; 16] = [
     "diffuse",
     "conductor",
     "roughconductor",
@@ -25,6 +26,7 @@ const KINDS: [&str; 15] = [
     "plastic",
     "roughplastic",
     "phong",
+    "principled",
     "null",
     "mask",
     "blendbsdf",
@@ -196,6 +198,7 @@ fn plain(plugin: &mut Plugin<'_>) -> Result<Bsdf, LoadError> {
             specular_reflectance: plugin.colour_texture("specular_reflectance", 0.2)?,
             diffuse_reflectance: plugin.colour_texture("diffuse_reflectance", 0.5)?,
         }),
+        "principled" => Bsdf::Principled(Box::new(principled::principled(plugin)?)),
         "null" => Bsdf::Null,
         _ => return Err(plugin.unknown(&KINDS)),
     })
