@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use glam::{DVec2, DVec3, Vec3};
-use pathblend::bsdf::{Bsdf, Conductor, Dielectric, Diffuse, Distribution, Microfacet, RoughConductor};
+use pathblend::bsdf::{Bsdf, Conductor, Dielectric, Diffuse, Distribution, RoughConductor, Roughness};
 use pathblend::camera::Camera;
 use pathblend::film::Filter;
 use pathblend::geometry::Solid;
@@ -123,7 +123,7 @@ fn under_an_even_sky_glass_is_invisible_and_paint_shows_its_albedo() {
     for (body, expected, max_depth) in [(diffuse(0.7), 0.7, 4), (glass, 1.0, 40)] {
         let mut builder = Builder::new();
         let bsdf = builder.bsdf(body);
-        builder.solid(Solid::Sphere { center: DVec3::ZERO, radius: 1.0 }, bsdf, None).unwrap();
+        builder.solid(Solid::sphere(DVec3::ZERO, 1.0), bsdf, None).unwrap();
         builder.emitter(Shine::Environment(Spectrum::ONE)).unwrap();
         let scene = build(builder, camera(DVec3::new(0.0, 0.0, -4.0), DVec3::Z, 0.1), max_depth);
         for method in METHODS {
@@ -137,7 +137,7 @@ fn under_an_even_sky_glass_is_invisible_and_paint_shows_its_albedo() {
 fn a_point_light_falls_off_as_it_should() {
     let mut builder = Builder::new();
     let paint = builder.bsdf(diffuse(0.8));
-    builder.solid(Solid::Disk { center: DVec3::ZERO, normal: DVec3::Z, radius: 10.0 }, paint, None).unwrap();
+    builder.solid(Solid::disk(DVec3::ZERO, DVec3::Z, 10.0), paint, None).unwrap();
     builder.emitter(Shine::Point(DVec3::new(0.0, 0.0, 2.0), Spectrum::grey(5.0))).unwrap();
     // A narrow view of the point (1, 0, 0).
     let scene = build(builder, camera(DVec3::new(1.0, 0.0, 1.0), -DVec3::Z, 1e-4), 3);
@@ -153,9 +153,9 @@ fn a_point_light_falls_off_as_it_should() {
 fn a_sphere_light_has_its_form_factor() {
     let mut builder = Builder::new();
     let paint = builder.bsdf(diffuse(0.6));
-    builder.solid(Solid::Disk { center: DVec3::ZERO, normal: DVec3::Z, radius: 10.0 }, paint, None).unwrap();
+    builder.solid(Solid::disk(DVec3::ZERO, DVec3::Z, 10.0), paint, None).unwrap();
     let black = builder.bsdf(diffuse(0.0));
-    let lamp = Solid::Sphere { center: DVec3::new(0.0, 0.0, 3.0), radius: 1.0 };
+    let lamp = Solid::sphere(DVec3::new(0.0, 0.0, 3.0), 1.0);
     builder.solid(lamp, black, Some(Spectrum::grey(4.0).into())).unwrap();
     // Below the sphere, as the camera must not block or see it.
     let scene = build(builder, camera(DVec3::new(0.0, 0.0, 1.0), -DVec3::Z, 1e-3), 3);
@@ -172,14 +172,14 @@ fn a_point_light_in_a_glass_ball_shines_as_if_it_were_bare() {
     let (height, reflectance, intensity) = (2.0, 0.8, 5.0);
     let mut builder = Builder::new();
     let paint = builder.bsdf(diffuse(reflectance));
-    builder.solid(Solid::Disk { center: DVec3::ZERO, normal: DVec3::Z, radius: 10.0 }, paint, None).unwrap();
+    builder.solid(Solid::disk(DVec3::ZERO, DVec3::Z, 10.0), paint, None).unwrap();
     let glass = builder.bsdf(Bsdf::Dielectric(Dielectric {
         eta: 1.5,
         specular_reflectance: Spectrum::ONE,
         specular_transmittance: Spectrum::ONE,
     }));
     let center = DVec3::new(0.0, 0.0, height);
-    builder.solid(Solid::Sphere { center, radius: 0.2 }, glass, None).unwrap();
+    builder.solid(Solid::sphere(center, 0.2), glass, None).unwrap();
     builder.emitter(Shine::Point(center, Spectrum::grey(intensity))).unwrap();
     // Looks down from below the ball at the square [-1, 1]² of the floor.
     let scene = build(builder, camera(DVec3::Z, -DVec3::Z, 1.0), 6);
@@ -205,7 +205,7 @@ fn a_point_light_in_a_glass_ball_shines_as_if_it_were_bare() {
 fn a_lamp_under_glass_is_dimmed_by_the_squared_index() {
     let mut builder = Builder::new();
     let black = builder.bsdf(diffuse(0.0));
-    let lamp = Solid::Disk { center: DVec3::ZERO, normal: DVec3::Z, radius: 1.0 };
+    let lamp = Solid::disk(DVec3::ZERO, DVec3::Z, 1.0);
     builder.solid(lamp, black, Some(Spectrum::grey(3.0).into())).unwrap();
     let glass = builder.bsdf(Bsdf::Dielectric(Dielectric {
         eta: 1.5,
@@ -213,9 +213,7 @@ fn a_lamp_under_glass_is_dimmed_by_the_squared_index() {
         specular_transmittance: Spectrum::ONE,
     }));
     // The surface of the glass; the disk's normal points to the outside.
-    builder
-        .solid(Solid::Disk { center: DVec3::new(0.0, 0.0, 0.5), normal: DVec3::Z, radius: 2.0 }, glass, None)
-        .unwrap();
+    builder.solid(Solid::disk(DVec3::new(0.0, 0.0, 0.5), DVec3::Z, 2.0), glass, None).unwrap();
     let scene = build(builder, camera(DVec3::new(0.0, 0.0, 2.0), -DVec3::Z, 1e-3), 3);
     for method in METHODS {
         expect(&scene, method, 64, "beauty", 3.0 * 0.96 / 2.25, colour_mean);
@@ -228,25 +226,25 @@ fn the_unbiased_methods_agree_class_by_class() {
     let mut builder = Builder::new();
     let paint = builder.bsdf(diffuse(0.6));
     builder.mesh(room(), paint, None).unwrap();
-    let mirror = Conductor { index: None, specular_reflectance: Spectrum::grey(0.9) };
-    let microfacet = |alpha| Microfacet { distribution: Distribution::Ggx, alpha };
+    let mirror = Conductor { index: None, specular_reflectance: Spectrum::grey(0.9).into() };
+    let roughness = |alpha| Roughness::isotropic(Distribution::Ggx, alpha);
     let bodies = [
         Bsdf::Dielectric(Dielectric {
             eta: 1.5,
             specular_reflectance: Spectrum::ONE,
             specular_transmittance: Spectrum::ONE,
         }),
-        Bsdf::Conductor(mirror),
-        Bsdf::RoughConductor(RoughConductor { metal: mirror, microfacet: microfacet(0.3) }),
-        Bsdf::RoughConductor(RoughConductor { metal: mirror, microfacet: microfacet(0.12) }),
+        Bsdf::Conductor(mirror.clone()),
+        Bsdf::RoughConductor(RoughConductor { metal: mirror.clone(), roughness: roughness(0.3) }),
+        Bsdf::RoughConductor(RoughConductor { metal: mirror.clone(), roughness: roughness(0.12) }),
     ];
     for (i, body) in bodies.into_iter().enumerate() {
         let bsdf = builder.bsdf(body);
         let center = DVec3::new(-0.6 + 0.4 * i as f64, -0.8, 0.3 * (i % 2) as f64);
-        builder.solid(Solid::Sphere { center, radius: 0.18 }, bsdf, None).unwrap();
+        builder.solid(Solid::sphere(center, 0.18), bsdf, None).unwrap();
     }
     let black = builder.bsdf(diffuse(0.0));
-    let lamp = Solid::Disk { center: DVec3::new(0.0, 0.99, 0.0), normal: -DVec3::Y, radius: 0.4 };
+    let lamp = Solid::disk(DVec3::new(0.0, 0.99, 0.0), -DVec3::Y, 0.4);
     builder.solid(lamp, black, Some(Spectrum::grey(10.0).into())).unwrap();
     let scene = build(builder, camera(DVec3::new(0.0, -0.2, -0.9), DVec3::new(0.0, -0.5, 1.0), 0.6), 6);
     let classes = ["LDE", "LSE", "LDDE", "LDSE", "LSDE", "LDDDE", "LSSDE", "LDSSE", "LDDDDE"];

@@ -34,10 +34,10 @@ impl Scene {
         let solids = (0..solids).map(|i| {
             let center = scale * in_cube(rng) + shift;
             let radius = scale * rng.random_range(0.01..0.3);
-            if i % 2 == 0 {
-                Solid::Sphere { center, radius }
-            } else {
-                Solid::Disk { center, normal: unit(rng), radius }
+            match i % 3 {
+                0 => Solid::sphere(center, radius),
+                1 => Solid::disk(center, unit(rng), radius),
+                _ => Solid::cylinder(center, center + scale * in_cube(rng), radius),
             }
         });
         Self {
@@ -72,15 +72,22 @@ fn moeller_trumbore([a, b, c]: [DVec3; 3], ray: &Ray) -> Option<(f64, f64, f64)>
 /// The schoolbook formulas.
 fn textbook(solid: &Solid, ray: &Ray) -> Option<f64> {
     match *solid {
-        Solid::Sphere { center, radius } => {
+        Solid::Sphere { center, radius, .. } => {
             let oc = ray.origin - center;
             let (b, c) = (2.0 * oc.dot(ray.direction), oc.length_squared() - radius * radius);
             let root = (b * b - 4.0 * c).sqrt();
             [(-b - root) / 2.0, (-b + root) / 2.0].into_iter().find(|t| *t > 0.0)
         }
-        Solid::Disk { center, normal, radius } => {
+        Solid::Disk { center, normal, radius, .. } => {
             let t = (center - ray.origin).dot(normal) / ray.direction.dot(normal);
             (t > 0.0 && ray.at(t).distance(center) <= radius).then_some(t)
+        }
+        Solid::Cylinder { bottom, axes, length, radius } => {
+            let (o, d) = (axes.to_local(ray.origin - bottom), axes.to_local(ray.direction));
+            let (a, b) = (d.x * d.x + d.y * d.y, 2.0 * (o.x * d.x + o.y * d.y));
+            let root = (b * b - 4.0 * a * (o.x * o.x + o.y * o.y - radius * radius)).sqrt();
+            let on_side = |t: &f64| *t > 0.0 && (0.0..=length).contains(&(o.z + t * d.z));
+            [(-b - root) / (2.0 * a), (-b + root) / (2.0 * a)].into_iter().find(on_side)
         }
     }
 }
@@ -172,11 +179,11 @@ fn unusable_primitives_are_dropped_and_counted() {
     let triangles =
         [[0, 1, 2], [3, 3, 3], [0, 1, 3], [4, 1, 2], [0, 5, 1], [0, 1, 99], [0, 1, 6], [0, 0, 1], [2, 1, 0]];
     let solids = [
-        Solid::Sphere { center: DVec3::splat(f64::NAN), radius: 1.0 },
-        Solid::Sphere { center: DVec3::ZERO, radius: -1.0 },
-        Solid::Sphere { center: DVec3::new(0.2, 0.2, 3.0), radius: 0.1 },
-        Solid::Disk { center: DVec3::ZERO, normal: DVec3::new(2.0, 0.0, 0.0), radius: 1.0 },
-        Solid::Sphere { center: DVec3::ZERO, radius: f64::INFINITY },
+        Solid::sphere(DVec3::splat(f64::NAN), 1.0),
+        Solid::sphere(DVec3::ZERO, -1.0),
+        Solid::sphere(DVec3::new(0.2, 0.2, 3.0), 0.1),
+        Solid::disk(DVec3::ZERO, DVec3::new(2.0, 0.0, 0.0), 1.0),
+        Solid::sphere(DVec3::ZERO, f64::INFINITY),
     ];
     let bvh = Bvh::build(&vertices, &triangles, &solids);
     assert_eq!(bvh.dropped(), Dropped { invalid: 5 + 4, degenerate: 2 });
@@ -226,7 +233,7 @@ fn the_interval_is_open_at_both_ends() {
 fn thousands_of_equal_triangles_and_solids_are_fine() {
     let mut scene = Scene::random(&mut Rng::seed_from_u64(10), 1, 0, 1.0, DVec3::ZERO);
     scene.triangles = vec![[0, 1, 2]; 20_000];
-    scene.solids = vec![Solid::Sphere { center: DVec3::new(0.0, 5.0, 0.0), radius: 0.5 }; 2000];
+    scene.solids = vec![Solid::sphere(DVec3::new(0.0, 5.0, 0.0), 0.5); 2000];
     let started = std::time::Instant::now();
     let bvh = Bvh::build(&scene.vertices, &scene.triangles, &scene.solids);
     println!("built in {:?}", started.elapsed());

@@ -100,19 +100,21 @@ fn a_wall_slightly_farther_is_met() {
 }
 
 #[test]
-fn offset_rays_leave_spheres_and_disks() {
+fn offset_rays_leave_spheres_disks_and_cylinders() {
     let mut rng = Rng::seed_from_u64(4);
     for round in 0..200_000 {
         let scale = [1e-4, 1e-2, 1.0, 1e2, 1e4][round % 5];
         let center = scale * in_ball(&mut rng) + [0.0, 1e5][round % 2] * in_ball(&mut rng);
         let radius = scale * rng.random_range(0.1..1.0);
         let normal = in_ball(&mut rng).normalize();
-        let sphere = Solid::Sphere { center, radius };
-        let disk = Solid::Disk { center, normal, radius };
+        let sphere = Solid::sphere(center, radius);
+        let disk = Solid::disk(center, normal, radius);
         // A hit found from afar, as a renderer finds it.
         let from = center + 10.0 * scale * in_ball(&mut rng).normalize();
         let towards = (center + 0.5 * radius * in_ball(&mut rng) - from).normalize();
-        for solid in [sphere, disk] {
+        let half = radius * normal;
+        let can = Solid::cylinder(center - half, center + half, radius);
+        for solid in [sphere, disk, can] {
             let ray = Ray::new(from, towards);
             let Some(t) = solid.intersect(&ray) else { continue };
             let point = solid.surface_point(ray.at(t));
@@ -120,6 +122,10 @@ fn offset_rays_leave_spheres_and_disks() {
             let distance = match solid {
                 Solid::Sphere { .. } => (point.position - center).length() - radius,
                 Solid::Disk { .. } => (point.position - center).dot(normal),
+                Solid::Cylinder { .. } => {
+                    let away = point.position - center;
+                    (away - away.dot(normal) * normal).length() - radius
+                }
             };
             assert!(distance.abs() <= point.error + 4.0 * f64::EPSILON * radius, "{distance:e} {:e}", point.error);
             assert!(point.position.distance(ray.at(t)) < 100.0 * bound);
@@ -131,6 +137,12 @@ fn offset_rays_leave_spheres_and_disks() {
             let enter = Ray::new(point.position - point.offset * point.normal, leaving(-point.normal, &mut rng));
             match solid {
                 Solid::Disk { .. } => assert_eq!(solid.intersect(&enter), None),
+                Solid::Cylinder { .. } => {
+                    let flat = enter.direction - enter.direction.dot(normal) * normal;
+                    let chord = -2.0 * flat.dot(point.normal) * radius / flat.length_squared();
+                    let t = solid.intersect(&enter);
+                    assert!(t.is_none_or(|t| t > 0.9 * chord), "{t:?} on a chord of {chord}");
+                }
                 Solid::Sphere { .. } => {
                     let t = solid.intersect(&enter).expect("the far side");
                     assert_eq!(bvh.intersect(&enter).map(|hit| hit.t), Some(t));

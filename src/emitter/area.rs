@@ -42,7 +42,7 @@ pub enum Surface {
         /// Choice by area.
         choice: Discrete,
     },
-    /// A sphere that shines outwards, or a disk.
+    /// A sphere or a cylinder that shines outwards, or a disk.
     Solid(Solid),
 }
 
@@ -73,14 +73,19 @@ impl Surface {
                 let at = warp::triangle::sample([u, row[2]]);
                 (facet.corner + facet.edges[0] * at.x + facet.edges[1] * at.y, facet.normal, facet.uv(at))
             }
-            Self::Solid(Solid::Sphere { center, radius }) => {
+            Self::Solid(Solid::Sphere { center, radius, .. }) => {
                 let normal = warp::sphere::sample([row[1], row[2]]);
                 (*center + normal * *radius, normal, DVec2::ZERO)
             }
-            Self::Solid(Solid::Disk { center, normal, radius }) => {
+            Self::Solid(Solid::Disk { center, normal, radius, .. }) => {
                 let at = warp::disk::sample([row[1], row[2]]) * *radius;
                 let frame = Frame::around(*normal);
                 (*center + frame.tangent * at.x + frame.bitangent * at.y, *normal, DVec2::ZERO)
+            }
+            Self::Solid(Solid::Cylinder { bottom, axes, length, radius }) => {
+                let (sin, cos) = (2.0 * PI * row[1]).sin_cos();
+                let normal = axes.tangent * cos + axes.bitangent * sin;
+                (*bottom + axes.normal * (row[2] * *length) + normal * *radius, normal, DVec2::ZERO)
             }
         }
     }

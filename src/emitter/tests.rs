@@ -53,7 +53,7 @@ fn spot() -> Spot {
 
 fn all() -> Vec<Emitter> {
     let grey = Spectrum::grey(2.0);
-    let sphere = crate::geometry::Solid::Sphere { center: DVec3::X, radius: 0.5 };
+    let sphere = crate::geometry::Solid::sphere(DVec3::X, 0.5);
     let others = [
         Emitter::Area(Area::new(grey.into(), Surface::Solid(sphere))),
         Emitter::Area(textured()),

@@ -19,4 +19,4 @@ pub use bvh::{Bvh, Dropped, NO_TRIANGLE};
 pub use hit::{Hit, Primitive};
 pub use offset::geometric_normal;
 pub use ray::Ray;
-pub use solid::{Solid, SurfacePoint};
+pub use solid::{Chart, Solid, SurfacePoint};

@@ -2,7 +2,7 @@
 
 use super::transform::normal_matrix;
 use crate::scene::Mesh;
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec2, DVec3};
 
 /// A mesh in its own space.
 #[derive(Clone, Debug, Default)]
@@ -10,7 +10,11 @@ pub(super) struct RawMesh {
     pub positions: Vec<DVec3>,
     /// One per position, of any length; empty where the file has none.
     pub normals: Vec<DVec3>,
+    /// Texture coordinates per position; empty where the file has none.
+    pub uvs: Vec<DVec2>,
     pub triangles: Vec<[u32; 3]>,
+    /// Whether the file itself asks for flat faces.
+    pub face_normals: bool,
 }
 
 /// What a shape says about its normals.
@@ -29,7 +33,7 @@ impl RawMesh {
     pub fn place(self, to_world: &DAffine3, facing: Facing) -> Mesh {
         let positions: Vec<_> = self.positions.iter().map(|p| to_world.transform_point3(*p)).collect();
         let normal_matrix = normal_matrix(to_world);
-        let mut normals: Vec<_> = match (facing.face_normals, self.normals.is_empty()) {
+        let mut normals: Vec<_> = match (facing.face_normals || self.face_normals, self.normals.is_empty()) {
             (true, _) => Vec::new(),
             (false, true) => average_normals(&positions, &self.triangles),
             (false, false) => self.normals.iter().map(|n| (normal_matrix * *n).normalize_or_zero()).collect(),
@@ -52,7 +56,7 @@ impl RawMesh {
         Mesh {
             positions: positions.iter().map(|p| p.as_vec3()).collect(),
             normals: normals.iter().map(|n| n.as_vec3()).collect(),
-            uvs: Vec::new(),
+            uvs: self.uvs.iter().map(|uv| uv.as_vec2()).collect(),
             triangles,
         }
     }
@@ -90,22 +94,32 @@ fn average_normals(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<DVec3> {
 
 /// [-1, 1]² at z = 0, normal +z.
 pub(super) fn rectangle() -> RawMesh {
-    let corner = |x, y| DVec3::new(x, y, 0.0);
+    let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(DVec2::from);
     RawMesh {
-        positions: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
-        normals: Vec::new(),
+        positions: corners.iter().map(|corner| corner.extend(0.0)).collect(),
+        uvs: corners.iter().map(|corner| (*corner + DVec2::ONE) / 2.0).collect(),
         triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..RawMesh::default()
     }
 }
 
-/// [-1, 1]³, normals outwards.
+/// Corners of the faces of a cube, counter-clockwise from outside. Mitsuba's order, since it places the texture.
+const CUBE: [[[f64; 3]; 4]; 6] = [
+    [[1.0, -1.0, -1.0], [1.0, -1.0, 1.0], [-1.0, -1.0, 1.0], [-1.0, -1.0, -1.0]],
+    [[1.0, 1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, 1.0, 1.0], [1.0, 1.0, 1.0]],
+    [[1.0, -1.0, -1.0], [1.0, 1.0, -1.0], [1.0, 1.0, 1.0], [1.0, -1.0, 1.0]],
+    [[1.0, -1.0, 1.0], [1.0, 1.0, 1.0], [-1.0, 1.0, 1.0], [-1.0, -1.0, 1.0]],
+    [[-1.0, -1.0, 1.0], [-1.0, 1.0, 1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, -1.0]],
+    [[1.0, 1.0, -1.0], [1.0, -1.0, -1.0], [-1.0, -1.0, -1.0], [-1.0, 1.0, -1.0]],
+];
+
+/// [-1, 1]³, normals outwards; the whole texture on each face.
 pub(super) fn cube() -> RawMesh {
-    // Corner i has its coordinates' signs in bits 0 (x), 1 (y) and 2 (z).
-    let sign = |i: u32, bit: u32| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let corners = [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]].map(DVec2::from);
     RawMesh {
-        positions: (0..8).map(|i| DVec3::new(sign(i, 0), sign(i, 1), sign(i, 2))).collect(),
-        normals: Vec::new(),
-        triangles: quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
+        positions: CUBE.as_flattened().iter().map(|corner| DVec3::from(*corner)).collect(),
+        uvs: corners.repeat(6),
+        triangles: (0..6).flat_map(|face| [[0, 1, 2], [3, 0, 2]].map(|t| t.map(|i| 4 * face + i))).collect(),
+        ..RawMesh::default()
     }
 }

@@ -4,7 +4,8 @@
 //! an error that names it and says what is expected. Understood are
 //!
 //! - shapes `rectangle`, `cube`, `sphere`, `disk`, `obj`, `ply`;
-//! - bsdfs `diffuse`, `conductor`, `roughconductor`, `dielectric`, `twosided`, nested or by reference;
+//! - bsdfs `diffuse`, `conductor`, `roughconductor`, `dielectric`, `thindielectric`, `roughdielectric`, `plastic`,
+//!   `roughplastic`, `phong`, `null`, `mask`, `blendbsdf`, `twosided`, nested or by reference;
 //! - textures `bitmap`, `checkerboard`;
 //! - emitters `area`, `constant`, `envmap`, `sunsky` (also `sun`, `sky`), `point`, `spot`, `directional`;
 //! - sensors `perspective`, `thinlens` with an `hdrfilm` and the filters `box`, `tent`, `gaussian`;
@@ -24,7 +25,9 @@ mod picture;
 mod plugin;
 mod ply;
 mod references;
+mod round;
 mod sensor;
+mod serialized;
 mod shape;
 mod source;
 mod spectral;
@@ -34,11 +37,12 @@ mod value;
 
 pub use error::{LoadError, Place};
 
-use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::scene::{BsdfId, Builder, FilmSpec, Scene, SceneError};
+use bsdf::Model;
 use document::{Document, Element};
 use files::{At, Files};
+use glam::DAffine3;
 use plugin::Plugin;
 use shape::Form;
 use source::Source;
@@ -51,6 +55,9 @@ pub const UNBOUNDED_DEPTH: usize = 65;
 
 /// Largest `max_depth` that a scene may ask for.
 pub const LARGEST_DEPTH: usize = 4096;
+
+/// Most triangles of a scene: instances of instances would fill any memory.
+const MOST_TRIANGLES: usize = 1 << 28;
 
 const TAGS: [&str; 7] = ["default", "integrator", "sensor", "texture", "bsdf", "emitter", "shape"];
 
@@ -117,6 +124,7 @@ struct Reader {
     sensor: Option<(Camera, FilmSpec)>,
     max_depth: Option<usize>,
     shapes: usize,
+    triangles: usize,
     /// Scattering models in use, by node and by whether they are turned over.
     bsdfs: HashMap<(Option<At>, bool), BsdfId>,
     warnings: Vec<String>,
@@ -165,12 +173,26 @@ impl Reader {
     }
 
     fn shape(&mut self, element: Element<'_>) -> Result<(), LoadError> {
-        let shape = shape::read(element)?;
+        for (member, to_world) in shape::members(element)? {
+            self.member(member, &to_world)?;
+        }
+        Ok(())
+    }
+
+    /// Adds a shape that `to_world` places once more.
+    fn member(&mut self, element: Element<'_>, to_world: &DAffine3) -> Result<(), LoadError> {
+        let shape = shape::read(element, to_world)?;
         let bsdf = self.bsdf(shape.bsdf, shape.turned)?;
         if let Some(bytes) = &shape.file {
             self.builder.fingerprint(bytes);
         }
         self.shapes += 1;
+        if let Form::Mesh(mesh) = &shape.form {
+            self.triangles += mesh.triangles.len();
+        }
+        if self.triangles > MOST_TRIANGLES {
+            return Err(element.error(format!("with this shape the scene has more than {MOST_TRIANGLES} triangles")));
+        }
         let added = match shape.form {
             Form::Mesh(mesh) => self.builder.mesh(mesh, bsdf, shape.radiance),
             Form::Solid(solid) => self.builder.solid(solid, bsdf, shape.radiance),
@@ -184,8 +206,14 @@ impl Reader {
         if let Some(id) = self.bsdfs.get(&key) {
             return Ok(*id);
         }
-        let model: Bsdf = element.map_or(Ok(bsdf::default()), bsdf::read)?;
-        let id = self.builder.bsdf(if turned { bsdf::turned(model) } else { model });
+        let Model { bsdf, relief } = match element {
+            Some(element) => bsdf::read(element)?,
+            None => Model { bsdf: bsdf::default(), relief: None },
+        };
+        let id = self.builder.bsdf(if turned { bsdf::turned(bsdf) } else { bsdf });
+        if let Some(relief) = relief {
+            self.builder.relief(id, relief);
+        }
         self.bsdfs.insert(key, id);
         Ok(id)
     }

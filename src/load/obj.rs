@@ -1,60 +1,137 @@
 //! Wavefront OBJ. Groups and materials are left aside: they do not change the shape, and Mitsuba does the same.
 
-use super::guard;
 use super::mesh::RawMesh;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use std::borrow::Cow;
-use std::io::Cursor;
+use std::collections::HashMap;
 
-/// Most characters of an index: larger ones cannot be right, and would overflow.
-const INDEX_LENGTH: usize = 11;
+/// What a corner has in the place of an index that it does not give.
+const NONE: u32 = u32::MAX;
 
-/// Reads the mesh in `bytes`. Polygons become fans of triangles; points and lines are left out.
-pub(super) fn read(bytes: &[u8]) -> Result<RawMesh, String> {
-    let geometry = geometry(bytes)?;
-    let options = tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
-    let no_materials = |_: &std::path::Path| Ok(Default::default());
-    let load = || tobj::load_obj_buf(&mut Cursor::new(&geometry), &options, no_materials);
-    let (models, _) = guard(load)?.map_err(|error| error.to_string())?;
-    let no_faces = || "it contains no faces".to_owned();
-    let model = models.first().filter(|model| !model.mesh.indices.is_empty()).ok_or_else(no_faces)?;
-    let triples = |flat: &[f32]| -> Vec<DVec3> {
-        flat.chunks_exact(3).map(|c| DVec3::new(c[0].into(), c[1].into(), c[2].into())).collect()
-    };
-    let mesh = RawMesh {
-        positions: triples(&model.mesh.positions),
-        normals: triples(&model.mesh.normals),
-        triangles: model.mesh.indices.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),
-    };
-    if !mesh.normals.is_empty() && mesh.normals.len() != mesh.positions.len() {
-        return Err("some faces have normals and others have none".to_owned());
-    }
-    Ok(mesh)
+/// A corner of a face: indices from 0 of its position, texture coordinates and normal.
+type Corner = [u32; 3];
+
+/// What the lines say, in their order.
+#[derive(Default)]
+struct Lines {
+    positions: Vec<DVec3>,
+    uvs: Vec<DVec2>,
+    normals: Vec<DVec3>,
+    corners: Vec<Corner>,
+    /// Where the corners of each triangle are, and its line.
+    triangles: Vec<([u32; 3], u32)>,
 }
 
-/// The lines of `bytes` that describe vertices and faces. Faces are checked, so that a bad one is named by its line.
-fn geometry(bytes: &[u8]) -> Result<Vec<u8>, String> {
-    let mut kept = Vec::with_capacity(bytes.len());
-    // Vertices, texture coordinates and normals so far.
-    let mut counts = [0; 3];
+/// Reads the mesh in `bytes`. Polygons become fans of triangles; points and lines are left out. With `flip_v` texture
+/// coordinates count from the top.
+pub(super) fn read(bytes: &[u8], flip_v: bool) -> Result<RawMesh, String> {
+    let mut lines = Lines::default();
     for (index, line) in joined(bytes).split(|byte| *byte == b'\n').enumerate() {
         let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        let located = |reason: String| format!("line {}: {reason}", index + 1);
         match words.next() {
-            Some(b"v") => counts[0] += 1,
-            Some(b"vt") => counts[1] += 1,
-            Some(b"vn") => counts[2] += 1,
-            Some(b"f") => {
-                if let Some(word) = words.find(|word| !is_corner(word, counts)) {
-                    let word = String::from_utf8_lossy(word);
-                    return Err(format!("line {}: `{word}` is not a corner of a face", index + 1));
-                }
+            Some(b"v") => lines.positions.push(DVec3::from(numbers(words, 3).map_err(located)?)),
+            Some(b"vn") => lines.normals.push(DVec3::from(numbers(words, 3).map_err(located)?)),
+            Some(b"vt") => {
+                let [u, v, _] = numbers(words, 1).map_err(located)?;
+                lines.uvs.push(DVec2::new(u, if flip_v { 1.0 - v } else { v }));
             }
-            _ => continue,
+            Some(b"f") => lines.face(words, index as u32 + 1).map_err(located)?,
+            _ => {}
         }
-        kept.extend_from_slice(line);
-        kept.push(b'\n');
     }
-    Ok(kept)
+    lines.mesh()
+}
+
+impl Lines {
+    fn face<'w>(&mut self, words: impl Iterator<Item = &'w [u8]>, line: u32) -> Result<(), String> {
+        let counts = [self.positions.len(), self.uvs.len(), self.normals.len()];
+        let first = self.corners.len() as u32;
+        for word in words {
+            let corner = corner(word, counts);
+            let named = || format!("`{}` is not a corner of a face", String::from_utf8_lossy(word));
+            self.corners.push(corner.ok_or_else(named)?);
+        }
+        for last in first + 2..self.corners.len() as u32 {
+            self.triangles.push(([first, last - 1, last], line));
+        }
+        Ok(())
+    }
+
+    /// The mesh with one vertex per corner that differs from all others.
+    fn mesh(self) -> Result<RawMesh, String> {
+        if self.triangles.is_empty() {
+            return Err("it contains no faces".to_owned());
+        }
+        let mut mesh = RawMesh::default();
+        let used = |i: usize| self.corners.iter().any(|corner| corner[i] != NONE);
+        let (mapped, smooth) = (used(1), used(2));
+        let mut known: HashMap<Corner, u32> = HashMap::with_capacity(self.positions.len());
+        for (triangle, line) in &self.triangles {
+            let mut vertices = [0; 3];
+            for (vertex, place) in vertices.iter_mut().zip(triangle) {
+                let corner = self.corners[*place as usize];
+                *vertex = match known.get(&corner) {
+                    Some(index) => *index,
+                    None => {
+                        self.vertex(corner, mapped, smooth, &mut mesh)
+                            .ok_or_else(|| format!("line {line}: a face refers to a vertex that does not exist"))?;
+                        let index = mesh.positions.len() as u32 - 1;
+                        known.insert(corner, index);
+                        index
+                    }
+                };
+            }
+            mesh.triangles.push(vertices);
+        }
+        Ok(mesh)
+    }
+
+    /// Adds a vertex. One without a normal or texture coordinates among others that have them gets zeros, as in Mitsuba.
+    fn vertex(&self, [position, uv, normal]: Corner, mapped: bool, smooth: bool, mesh: &mut RawMesh) -> Option<()> {
+        mesh.positions.push(*self.positions.get(position as usize)?);
+        if mapped {
+            mesh.uvs.push(if uv == NONE { DVec2::ZERO } else { *self.uvs.get(uv as usize)? });
+        }
+        if smooth {
+            mesh.normals.push(if normal == NONE { DVec3::ZERO } else { *self.normals.get(normal as usize)? });
+        }
+        Some(())
+    }
+}
+
+/// The first three numbers of a line, which has at least `least`; missing ones are zero.
+fn numbers<'w>(mut words: impl Iterator<Item = &'w [u8]>, least: usize) -> Result<[f64; 3], String> {
+    let mut result = [0.0; 3];
+    for (i, slot) in result.iter_mut().enumerate() {
+        match words.next() {
+            None if i < least => return Err(format!("it has fewer than {least} numbers")),
+            None => break,
+            Some(word) => {
+                let number = std::str::from_utf8(word).ok().and_then(|text| text.parse().ok());
+                *slot = number.ok_or_else(|| format!("`{}` is not a number", String::from_utf8_lossy(word)))?;
+            }
+        }
+    }
+    Ok(result)
+}
+
+/// `v`, `v/vt`, `v//vn` or `v/vt/vn` with indices from 1, or from -1 backwards through `counts`.
+fn corner(word: &[u8], counts: [usize; 3]) -> Option<Corner> {
+    let mut corner = [NONE; 3];
+    for (i, part) in word.split(|byte| *byte == b'/').enumerate() {
+        if part.is_empty() && i > 0 {
+            continue;
+        }
+        let number: i64 = std::str::from_utf8(part).ok()?.parse().ok()?;
+        let index = match number {
+            1.. => number - 1,
+            0 => return None,
+            _ => (counts.get(i).copied()? as i64).checked_add(number)?,
+        };
+        *corner.get_mut(i)? = u32::try_from(index).ok().filter(|index| *index != NONE)?;
+    }
+    Some(corner)
 }
 
 /// The text with lines that end in a backslash joined to the next, at the same line numbers.
@@ -79,19 +156,6 @@ fn joined(bytes: &[u8]) -> Cow<'_, [u8]> {
     Cow::Owned(text)
 }
 
-/// Whether `word` is `v`, `v/vt`, `v//vn` or `v/vt/vn` with indices from 1, or from -1 backwards through `counts`.
-fn is_corner(word: &[u8], counts: [i64; 3]) -> bool {
-    let parts: Vec<_> = word.split(|byte| *byte == b'/').collect();
-    let valid = |(part, count): (&&[u8], i64)| {
-        let number = std::str::from_utf8(part).ok().filter(|text| text.len() <= INDEX_LENGTH);
-        number
-            .and_then(|text| text.parse::<i64>().ok())
-            .is_some_and(|index| index > 0 || (index < 0 && -index <= count))
-    };
-    let empty_middle = parts.len() == 3 && parts[1].is_empty();
-    parts.len() <= 3 && parts.iter().zip(counts).enumerate().all(|(i, part)| (i == 1 && empty_middle) || valid(part))
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
@@ -101,30 +165,43 @@ mod tests {
     #[test]
     fn polygons_groups_and_continued_lines_are_read() {
         let text = b"# \xff\nmtllib none.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\ng a\nf 1 2 \\\n 3 4\no b\nusemtl c\nf -1 -2 -3\nl 1 2\n";
-        let mesh = read(text).unwrap();
+        let mesh = read(text, true).unwrap();
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [3, 2, 1]]);
         assert_eq!(mesh.positions[2], DVec3::new(1.0, 1.0, 0.0));
-        assert!(mesh.normals.is_empty());
+        assert!(mesh.normals.is_empty() && mesh.uvs.is_empty());
+    }
+
+    /// Corners with and without normals and texture coordinates stand side by side.
+    #[test]
+    fn corners_are_told_apart_by_all_their_indices() {
+        let text =
+            b"v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0.25\nvt 1\nvn 0 0 2\nf 1/1/1 2/2/1 3/1/1\nf 1/2 2/2/1 3//1\nf 1 2 3\n";
+        let mesh = read(text, true).unwrap();
+        assert_eq!(mesh.triangles, [[0, 1, 2], [3, 1, 4], [5, 6, 7]]);
+        assert_eq!(mesh.uvs[..2], [DVec2::new(0.0, 0.75), DVec2::new(1.0, 1.0)]);
+        assert_eq!((mesh.normals[0], mesh.normals[5]), (DVec3::new(0.0, 0.0, 2.0), DVec3::ZERO));
+        assert_eq!(read(text, false).unwrap().uvs[0], DVec2::new(0.0, 0.25));
     }
 
     #[test]
     fn bad_files_are_explained() {
-        let cases: [(&str, &str); 8] = [
-            ("", "it contains no faces"),
-            ("v 0 0\nf 1 1 1", "position parse error"),
-            ("v 0 0 0\nf 1 1 2", "face vertex index out of bounds"),
-            ("v 0 0 0\nf 1 1 -2", "line 2: `-2` is not a corner of a face"),
-            ("v 0 0 0\nv 0 0 0 \\\n\nf 1 0 1", "line 4: `0` is not a corner of a face"),
-            ("v 0 0 0\nf 1/1 1/-9223372036854775808 1", "line 2: `1/-9223372036854775808` is not a corner of a face"),
-            ("v 0 0 0\nf 1//1 1//1 1//1", "it contains no faces"),
-            ("v 0 0 0\nvn 0 0 1\nf 1//1 1 1//1", "some faces have normals and others have none"),
+        let missing = "a face refers to a vertex that does not exist";
+        let cases = [
+            ("", "it contains no faces".to_owned()),
+            ("v 0 0\nf 1 1 1", "line 1: it has fewer than 3 numbers".to_owned()),
+            ("v 0 0 z\nf 1 1 1", "line 1: `z` is not a number".to_owned()),
+            ("v 0 0 0\nf 1 1 2", format!("line 2: {missing}")),
+            ("v 0 0 0\nf 1 1 -2", "line 2: `-2` is not a corner of a face".to_owned()),
+            ("v 0 0 0\nv 0 0 0 \\\n\nf 1 0 1", "line 4: `0` is not a corner of a face".to_owned()),
+            (
+                "v 0 0 0\nf 1/1 1/-9223372036854775808 1",
+                "line 2: `1/-9223372036854775808` is not a corner of a face".to_owned(),
+            ),
+            ("v 0 0 0\nf 1/1/1/1 1 1", "line 2: `1/1/1/1` is not a corner of a face".to_owned()),
+            ("v 0 0 0\nf 1//1 1//1 1//1", format!("line 2: {missing}")),
         ];
         for (text, message) in cases {
-            match read(text.as_bytes()) {
-                Err(found) => assert_eq!(found, message, "{text}"),
-                // Indices of normals that are not there are ignored where there are none at all.
-                Ok(mesh) => assert!(mesh.normals.is_empty() && text.contains("//1 1//1"), "{text}"),
-            }
+            assert_eq!(read(text.as_bytes(), true).err(), Some(message), "{text}");
         }
     }
 }

@@ -153,7 +153,12 @@ impl<'a> Plugin<'a> {
 
     /// A truth value, `false` where it is not given.
     pub fn boolean(&mut self, name: &'static str) -> Result<bool, LoadError> {
-        Ok(self.scalar(name, &["boolean"], |text| text.boolean())?.is_some_and(|flag| flag.value))
+        self.boolean_or(name, false)
+    }
+
+    /// A truth value, `default` where it is not given.
+    pub fn boolean_or(&mut self, name: &'static str, default: bool) -> Result<bool, LoadError> {
+        Ok(self.scalar(name, &["boolean"], |text| text.boolean())?.map_or(default, |flag| flag.value))
     }
 
     /// A text.

@@ -2,7 +2,7 @@
 
 use super::guard;
 use super::mesh::RawMesh;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{ElementDef, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType};
 use std::io::Cursor;
@@ -17,6 +17,7 @@ const SHOWN: usize = 200;
 struct Vertex {
     position: [f64; 3],
     normal: [f64; 3],
+    uv: [f64; 2],
 }
 
 impl PropertyAccess for Vertex {
@@ -32,6 +33,8 @@ impl PropertyAccess for Vertex {
             "nx" => &mut self.normal[0],
             "ny" => &mut self.normal[1],
             "nz" => &mut self.normal[2],
+            "u" | "s" => &mut self.uv[0],
+            "v" | "t" => &mut self.uv[1],
             _ => return PropertyAccessResult::Ignored,
         };
         *slot = match property {
@@ -74,9 +77,13 @@ impl PropertyAccess for Other {
     }
 }
 
-/// Reads the mesh in `bytes`. Polygons become fans of triangles.
-pub(super) fn read(bytes: &[u8]) -> Result<RawMesh, String> {
-    guard(|| parse(bytes))?
+/// Reads the mesh in `bytes`. Polygons become fans of triangles. With `flip_v` texture coordinates count from the top.
+pub(super) fn read(bytes: &[u8], flip_v: bool) -> Result<RawMesh, String> {
+    let mut mesh = guard(|| parse(bytes))??;
+    if flip_v {
+        mesh.uvs.iter_mut().for_each(|uv| uv.y = 1.0 - uv.y);
+    }
+    Ok(mesh)
 }
 
 fn parse(bytes: &[u8]) -> Result<RawMesh, String> {
@@ -87,7 +94,7 @@ fn parse(bytes: &[u8]) -> Result<RawMesh, String> {
         words.join(" ").chars().take(SHOWN).collect::<String>()
     };
     let header = Parser::<Vertex>::new().read_header(&mut reader).map_err(one_line)?;
-    let has_normals = check(&header, bytes.len())?;
+    let (has_normals, has_uvs) = check(&header, bytes.len())?;
     let mut mesh = RawMesh::default();
     for (name, element) in &header.elements {
         match name.as_str() {
@@ -97,6 +104,9 @@ fn parse(bytes: &[u8]) -> Result<RawMesh, String> {
                 mesh.positions = vertices.iter().map(|vertex| DVec3::from(vertex.position)).collect();
                 if has_normals {
                     mesh.normals = vertices.iter().map(|vertex| DVec3::from(vertex.normal)).collect();
+                }
+                if has_uvs {
+                    mesh.uvs = vertices.iter().map(|vertex| DVec2::from(vertex.uv)).collect();
                 }
             }
             "face" => {
@@ -123,8 +133,9 @@ fn fan(corners: &[u32]) -> impl Iterator<Item = [u32; 3]> {
     corners.windows(2).skip(1).map(|pair| [corners[0], pair[0], pair[1]])
 }
 
-/// Refuses a header without vertices or faces, or with more elements than the file has bytes; whether it has normals.
-fn check(header: &Header, bytes: usize) -> Result<bool, String> {
+/// Refuses a header without vertices or faces, or with more elements than the file has bytes; whether it has
+/// normals, and texture coordinates.
+fn check(header: &Header, bytes: usize) -> Result<(bool, bool), String> {
     let element = |name: &str| header.elements.get(name).ok_or_else(|| format!("it has no element `{name}`"));
     let (vertex, face) = (element("vertex")?, element("face")?);
     let has = |names: &[&str], element: &ElementDef| names.iter().all(|name| element.properties.contains_key(*name));
@@ -141,7 +152,7 @@ fn check(header: &Header, bytes: usize) -> Result<bool, String> {
     if count > bytes {
         return Err(format!("its header promises {count} elements, more than its {bytes} bytes can hold"));
     }
-    Ok(has(&["nx", "ny", "nz"], vertex))
+    Ok((has(&["nx", "ny", "nz"], vertex), has(&["u", "v"], vertex) || has(&["s", "t"], vertex)))
 }
 
 #[cfg(test)]
@@ -184,7 +195,7 @@ mod tests {
         POINTS.iter().for_each(|[x, y, z]| ascii += &format!("{x} {y} {z}\n"));
         ascii += "9 4 0 1 2 3\n9 3 3 2 4\n";
         for bytes in [ascii.into_bytes(), binary(true), binary(false)] {
-            let mesh = read(&bytes).unwrap();
+            let mesh = read(&bytes, false).unwrap();
             assert_eq!(mesh.positions, POINTS.map(DVec3::from));
             assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [3, 2, 4]]);
             assert!(mesh.normals.is_empty());
@@ -202,7 +213,7 @@ mod tests {
             ("ply\nformat ascii 1.0\nelement vertex 0\nend_header\n".into(), "it has no element `face`"),
         ];
         for (text, message) in cases {
-            let found = read(text.as_bytes()).err().unwrap();
+            let found = read(text.as_bytes(), false).err().unwrap();
             assert!(found.starts_with(message), "{found}");
         }
     }
@@ -211,7 +222,7 @@ mod tests {
     fn truncated_files_are_errors() {
         let bytes = binary(true);
         for length in 0..bytes.len() {
-            assert!(read(&bytes[..length]).is_err(), "{length}");
+            assert!(read(&bytes[..length], false).is_err(), "{length}");
         }
     }
 }

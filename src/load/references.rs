@@ -75,3 +75,28 @@ impl<'d> Walk<'d> {
         Ok(whole)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::document::with_root;
+
+    fn message(body: &str) -> Option<String> {
+        let text = format!("<scene version=\"3.0.0\">{body}</scene>");
+        with_root("s.xml".as_ref(), &text, |_| ()).err().map(|error| error.message)
+    }
+
+    #[test]
+    fn references_end() {
+        assert_eq!(message("<a id=\"x\"/><b><ref id=\"x\"/><ref id=\"x\"/></b>"), None);
+        let circle = "<a id=\"x\"><b><ref id=\"y\"/></b></a><a id=\"y\"><ref id=\"x\"/></a>";
+        assert_eq!(message(circle).as_deref(), Some("this refers to itself: y → x → y"));
+        let link = |i: usize, twice: &str| format!("<a id=\"x{i}\"><ref id=\"x{}\"/>{twice}</a>", i + 1);
+        let chain: String = (0..100).map(|i| link(i, "")).collect();
+        let found = message(&(chain + "<a id=\"x100\"/>")).unwrap_or_default();
+        assert!(found.contains("references, one in the other"), "{found}");
+        // Each element holds the next one twice.
+        let bomb: String = (0..40).rev().map(|i| link(i, &format!("<ref id=\"x{}\"/>", i + 1))).collect();
+        let found = message(&("<a id=\"x40\"/>".to_owned() + &bomb)).unwrap_or_default();
+        assert!(found.contains("this stands for more than"), "{found}");
+    }
+}

@@ -4,28 +4,26 @@ use super::document::Element;
 use super::error::LoadError;
 use super::mesh::{self, Facing, RawMesh};
 use super::plugin::Plugin;
-use super::transform::normal_matrix;
-use super::{obj, ply};
+use super::round;
+use super::source::read_bounded;
+use super::{obj, ply, serialized};
 use crate::geometry::Solid;
 use crate::scene::Mesh;
 use crate::texture::Colour;
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DVec3};
 
-const KINDS: [&str; 6] = ["rectangle", "cube", "sphere", "disk", "obj", "ply"];
+const KINDS: [&str; 10] =
+    ["rectangle", "cube", "sphere", "disk", "cylinder", "obj", "ply", "serialized", "shapegroup", "instance"];
 
 /// Largest coordinate: squares of distances stay finite in single precision.
 const FAR: f64 = 1e18;
-
-/// Relative deviation that a sphere's or a disk's transformation may have from one that keeps its form: matrices in
-/// scene files are rounded.
-const FORM_TOLERANCE: f64 = 1e-4;
 
 /// A shape of the scene file.
 pub(super) struct Shape<'a> {
     pub form: Form,
     /// Its scattering model, if it names one.
     pub bsdf: Option<Element<'a>>,
-    /// Whether the model is seen from the other side: the normals of [`Form::Solid`] spheres always point outwards.
+    /// Whether the model is seen from the other side: see [`round::Round::turned`].
     pub turned: bool,
     /// What it radiates.
     pub radiance: Option<Colour>,
@@ -39,30 +37,70 @@ pub(super) enum Form {
     Solid(Solid),
 }
 
-/// Reads a shape and the mesh file that it names.
-pub(super) fn read(element: Element<'_>) -> Result<Shape<'_>, LoadError> {
+/// The shapes that `element` stands for, each with what places it: the shape itself, the shapes that an `instance`
+/// repeats, or nothing for a `shapegroup`, which shows only where it is repeated.
+pub(super) fn members(element: Element<'_>) -> Result<Vec<(Element<'_>, DAffine3)>, LoadError> {
+    let mut plugin = Plugin::new(element)?;
+    match plugin.kind {
+        "shapegroup" => {
+            plugin.objects("shape")?;
+            plugin.finish()?;
+            Ok(Vec::new())
+        }
+        "instance" => {
+            let (to_world, _) = plugin.placement()?;
+            let group = plugin.object("shape")?;
+            plugin.finish()?;
+            let group = group.filter(|group| group.attribute("type").is_some_and(|kind| kind.text == "shapegroup"));
+            let group =
+                group.ok_or_else(|| element.error("an instance of nothing; expected a <ref> to a shapegroup"))?;
+            let shapes = Plugin::new(group)?.objects("shape")?;
+            for shape in &shapes {
+                check_member(*shape)?;
+            }
+            Ok(shapes.into_iter().map(|shape| (shape, to_world)).collect())
+        }
+        _ => Ok(vec![(element, DAffine3::IDENTITY)]),
+    }
+}
+
+/// Refuses what a group cannot hold, as Mitsuba does.
+fn check_member(shape: Element<'_>) -> Result<(), LoadError> {
+    let mut plugin = Plugin::new(shape)?;
+    if ["shapegroup", "instance"].contains(&plugin.kind) {
+        return Err(shape.error(format!("a shapegroup cannot hold the shape `{}`", plugin.kind)));
+    }
+    match plugin.object("emitter")? {
+        Some(emitter) => Err(emitter.error("a shape in a shapegroup cannot shine")),
+        None => Ok(()),
+    }
+}
+
+/// Reads a shape and the mesh file that it names; `outer` places it once more.
+pub(super) fn read<'a>(element: Element<'a>, outer: &DAffine3) -> Result<Shape<'a>, LoadError> {
     let mut plugin = Plugin::new(element)?;
     if !KINDS.contains(&plugin.kind) {
         return Err(plugin.unknown(&KINDS));
     }
-    let (to_world, transform) = plugin.placement()?;
+    let (inner, transform) = plugin.placement()?;
+    let to_world = *outer * inner;
     let flip_normals = plugin.boolean("flip_normals")?;
     let (mut turned, mut file) = (false, None);
     let form = match plugin.kind {
-        "sphere" => {
-            turned = (to_world.matrix3.determinant() < 0.0) != flip_normals;
-            Form::Solid(sphere(&mut plugin, &to_world, transform)?)
+        "sphere" | "disk" | "cylinder" => {
+            let round = round::read(&mut plugin, &to_world, transform, flip_normals)?;
+            turned = round.turned;
+            Form::Solid(round.solid)
         }
-        "disk" => Form::Solid(disk(&to_world, transform, flip_normals)?),
         kind => {
-            let facing = Facing { face_normals: plugin.boolean("face_normals")?, flip_normals };
+            let face_normals = plugin.boolean("face_normals")?;
             Form::Mesh(match kind {
                 "rectangle" => mesh::rectangle().place_solid(&to_world, flip_normals),
                 "cube" => mesh::cube().place_solid(&to_world, flip_normals),
                 _ => {
                     let (raw, bytes) = mesh_file(&mut plugin)?;
                     file = Some(bytes);
-                    raw.place(&to_world, facing)
+                    raw.place(&to_world, Facing { face_normals, flip_normals })
                 }
             })
         }
@@ -72,7 +110,9 @@ pub(super) fn read(element: Element<'_>) -> Result<Shape<'_>, LoadError> {
     let radiance = plugin.object("emitter")?.map(area).transpose()?;
     plugin.finish()?;
     if turned && radiance.is_some() {
-        return Err(element.error("a sphere that shines inwards is not supported; its normals must point outwards"));
+        let kind = element.required("type")?.text;
+        let message = format!("a {kind} that shines inwards is not supported; its normals must point outwards");
+        return Err(element.error(message));
     }
     if matches!((&form, &radiance), (Form::Solid(_), Some(Colour::Textured(_)))) {
         return Err(element.error("a sphere or disk that shines by a texture is not supported; expected a mesh"));
@@ -99,55 +139,38 @@ fn area(element: Element<'_>) -> Result<Colour, LoadError> {
 fn mesh_file(plugin: &mut Plugin<'_>) -> Result<(RawMesh, Vec<u8>), LoadError> {
     let name = plugin.string("filename")?.ok_or_else(|| plugin.lacks("filename"))?.value;
     let path = name.source.beside(name.text);
-    let bytes = std::fs::read(&path)
-        .map_err(|error| name.error(format!("cannot read the mesh {}: {error}", path.display())))?;
-    let raw = if plugin.kind == "obj" { obj::read(&bytes) } else { ply::read(&bytes) };
+    let bytes = read_bounded(&path, u64::MAX).map_err(|reason| {
+        let looked = name.source.looked(name.text);
+        name.error(format!("cannot read the mesh {}: {reason}{looked}", path.display()))
+    })?;
+    let raw = match plugin.kind {
+        "obj" => {
+            // Says how Mitsuba 0.6 groups what is one mesh here.
+            plugin.ignore(&["collapse"]);
+            obj::read(&bytes, plugin.boolean_or("flip_tex_coords", true)?)
+        }
+        "ply" => ply::read(&bytes, plugin.boolean("flip_tex_coords")?),
+        _ => {
+            let index = plugin.integer("shape_index")?;
+            let index =
+                index.map(|index| index.check(|index| *index >= 0, "a whole number of at least 0")).transpose()?;
+            serialized::read(&bytes, index.unwrap_or(0) as usize)
+        }
+    };
     let raw = raw.map_err(|reason| name.error(format!("the mesh {} is broken: {reason}", path.display())))?;
-    if !raw.positions.iter().chain(&raw.normals).all(|v| v.is_finite()) {
+    let finite = raw.positions.iter().chain(&raw.normals).all(|v| v.is_finite());
+    if !finite || !raw.uvs.iter().all(|uv| uv.is_finite()) {
         let message = format!("the mesh {} has a coordinate that is not a finite number", path.display());
         return Err(name.error(message));
     }
     Ok((raw, bytes))
 }
 
-fn sphere(plugin: &mut Plugin<'_>, to_world: &DAffine3, transform: Element<'_>) -> Result<Solid, LoadError> {
-    let center = plugin.point("center")?.unwrap_or(DVec3::ZERO);
-    let radius = plugin.positive("radius")?.unwrap_or(1.0);
-    let DMat3 { x_axis, y_axis, z_axis } = to_world.matrix3;
-    if !(alike(x_axis, y_axis) && alike(y_axis, z_axis) && alike(z_axis, x_axis)) {
-        let message = "a sphere that is scaled differently along its axes, or sheared, is no sphere; expected a \
-                       `to_world` that keeps its form";
-        return Err(transform.error(message));
-    }
-    Ok(Solid::Sphere { center: to_world.transform_point3(center), radius: radius * x_axis.length() })
-}
-
-fn disk(to_world: &DAffine3, transform: Element<'_>, flip_normals: bool) -> Result<Solid, LoadError> {
-    let DMat3 { x_axis, y_axis, .. } = to_world.matrix3;
-    if !alike(x_axis, y_axis) {
-        let message = "a disk that is scaled differently along x and y, or sheared, is no disk; expected a `to_world` \
-                       that keeps its form";
-        return Err(transform.error(message));
-    }
-    let normal = (normal_matrix(to_world) * DVec3::Z).normalize_or_zero();
-    let normal = if flip_normals { -normal } else { normal };
-    Ok(Solid::Disk { center: to_world.translation, normal, radius: x_axis.length() })
-}
-
-/// Whether two axes have the same length and a right angle between them.
-fn alike(a: DVec3, b: DVec3) -> bool {
-    let (la, lb) = (a.length(), b.length());
-    (la - lb).abs() <= FORM_TOLERANCE * la && a.dot(b).abs() <= FORM_TOLERANCE * la * lb
-}
-
 fn check_size(form: &Form, element: Element<'_>) -> Result<(), LoadError> {
     let near = |reach: DVec3| reach.abs().max_element() <= FAR;
     let fits = match form {
         Form::Mesh(mesh) => mesh.positions.iter().all(|p| p.is_finite() && near(p.as_dvec3())),
-        Form::Solid(Solid::Sphere { center, radius }) => near(center.abs() + *radius) && *radius > 0.0,
-        Form::Solid(Solid::Disk { center, normal, radius }) => {
-            near(center.abs() + *radius) && *radius > 0.0 && normal.is_normalized()
-        }
+        Form::Solid(solid) => solid.is_valid() && solid.bounds().max_abs() <= FAR,
     };
     let expected = format!("expected coordinates up to {FAR:e}");
     if fits {

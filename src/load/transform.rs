@@ -16,6 +16,7 @@ pub(super) fn read(element: Element<'_>) -> Result<DAffine3, LoadError> {
             "rotate" => rotate(step)?,
             "matrix" => matrix(step)?,
             "lookat" => look_at(step)?,
+            "lookAt" if step.is_legacy() => look_at(step)?,
             other => {
                 let expected = "translate, scale, rotate, matrix, lookat";
                 return Err(step.error(format!("unknown transformation <{other}>; expected one of {expected}")));

@@ -178,8 +178,9 @@ impl Builder {
         mapped: bool,
         surface: impl FnOnce(()) -> Option<Surface>,
     ) -> Result<u32, SceneError> {
-        let oriented = self.reliefs[bsdf.0 as usize].is_some();
-        let mut textured = oriented || !self.bsdfs[bsdf.0 as usize].is_constant();
+        let model = &self.bsdfs[bsdf.0 as usize];
+        let oriented = self.reliefs[bsdf.0 as usize].is_some() || !model.is_isotropic();
+        let mut textured = oriented || !model.is_constant();
         let emitter = match radiance.filter(|radiance| *radiance != Colour::Constant(Spectrum::BLACK)) {
             Some(radiance) => {
                 let surface = surface(()).ok_or(SceneError::NoArea)?;

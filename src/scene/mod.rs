@@ -133,9 +133,15 @@ impl Scene {
     #[inline]
     fn solid_surface(&self, index: usize, near: DVec3) -> Surface {
         let SurfacePoint { position, normal, offset, .. } = self.solids[index].surface_point(near);
-        let Shape { bsdf, emitter, .. } = self.shapes[self.solid_shapes[index] as usize];
-        let frame = Frame::around(normal);
-        let uv = DVec2::ZERO;
+        let Shape { bsdf, emitter, textured, oriented, .. } = self.shapes[self.solid_shapes[index] as usize];
+        let (mut uv, mut frame) = (DVec2::ZERO, Frame::around(normal));
+        if textured {
+            let chart = self.solids[index].chart(position);
+            uv = chart.uv;
+            if oriented {
+                frame = self.orient(normal, bsdf, uv, chart.derivatives);
+            }
+        }
         Surface { position, geometric: normal, frame, uv, bsdf, emitter, offset, triangle: NO_TRIANGLE }
     }
 

@@ -79,6 +79,23 @@ impl From<Spectrum> for Colour {
     }
 }
 
+/// A texture that perturbs the shading frame.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Relief {
+    /// Heights, the luminance of a texture times `scale`.
+    Bump {
+        /// The heights.
+        texture: Arc<Texture>,
+        /// Factor on the heights.
+        scale: f64,
+    },
+    /// Normals in the shading frame, from −1 to 1 as 0 to 1.
+    Normal {
+        /// The normals.
+        texture: Arc<Texture>,
+    },
+}
+
 /// A number that may vary: the luminance of a texture.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Number {
@@ -116,21 +133,4 @@ impl From<f64> for Number {
     fn from(number: f64) -> Self {
         Self::Constant(number)
     }
-}
-
-/// What tilts the shading normal of a surface.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Relief {
-    /// Height over the surface: the luminance of a texture.
-    Bump {
-        /// The texture.
-        texture: Arc<Texture>,
-        /// Factor on the height.
-        scale: f64,
-    },
-    /// The normal itself in the shading frame, each coordinate as half of it plus one half.
-    Normal {
-        /// The texture.
-        texture: Arc<Texture>,
-    },
 }

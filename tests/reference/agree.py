@@ -46,7 +46,7 @@ def upgrade(text):
     edit(r'<float name="samplingWeight"[^>]*/>', "", None)
     edit(r'"trilinear"', '"bilinear"', None)
     edit(r'"ewa"', '"bilinear"', None)
-    edit(r'<spectrum( name="[^"]*") value="([^":,]*)"\s*/>', r'<rgb\1 value="\2"/>', None)
+    edit(r'<spectrum( name="[^"]*") value="([^":]*)"\s*/>', r'<rgb\1 value="\2"/>', None)
     edit(r'<srgb( name="[^"]*") value="([^",]*)"\s*/>', r'<rgb\1 value="\2"/>', None)
     edit(r'type="phong"', 'type="roughplastic"', "phong as roughplastic")
     edit(r'<float name="exponent"[^>]*/>', "", None)
@@ -65,7 +65,7 @@ def mitsuba_batches(mi, np, path, size, args):
         folder = pathlib.Path(folder)
         for entry in path.parent.iterdir():
             if entry.name != path.name:
-                (folder / entry.name).symlink_to(entry)
+                (folder / entry.name).symlink_to(entry.resolve())
         (folder / path.name).write_text(text)
         start = time.process_time()
         wall = time.perf_counter()
