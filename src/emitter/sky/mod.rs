@@ -125,6 +125,16 @@ mod tests {
         }
     }
 
+    /// Irradiance by the sun that Mitsuba 0.6 has drawn into an image, at turbidity 5.
+    #[test]
+    fn the_sun_is_as_bright_as_that_of_mitsuba_0_6() {
+        let towards = DVec3::new(0.6145, 0.7830, 0.0960).normalize();
+        let sky = Sky { towards, turbidity: 5.0, albedo: Spectrum::grey(0.2), stretch: 1.0 };
+        let found = sky.sun_irradiance(1.0).to_rgb();
+        let close = found.iter().zip([1.1044, 0.8713, 0.6671]).all(|(a, b)| (a / b - 1.0).abs() < 0.01);
+        assert!(close, "{found:?}");
+    }
+
     /// Its light does not depend on how large the disk is drawn.
     #[test]
     fn a_larger_sun_is_darker() {
