@@ -115,9 +115,9 @@ impl Scene {
     #[inline]
     fn solid_surface(&self, index: usize, near: DVec3) -> Surface {
         let SurfacePoint { position, normal, offset, .. } = self.solids[index].surface_point(near);
-        let Shape { bsdf, emitter, .. } = self.shapes[self.solid_shapes[index] as usize];
+        let Shape { bsdf, emitter, textured, .. } = self.shapes[self.solid_shapes[index] as usize];
         let frame = Frame::around(normal);
-        let uv = DVec2::ZERO;
+        let uv = if textured { self.solids[index].chart(position).uv } else { DVec2::ZERO };
         Surface { position, geometric: normal, frame, uv, bsdf, emitter, offset, triangle: NO_TRIANGLE }
     }
 
