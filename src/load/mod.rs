@@ -22,6 +22,7 @@ mod shape;
 mod transform;
 mod value;
 
+pub(crate) use error::one_of;
 pub use error::{LoadError, Place};
 
 use crate::bsdf::Bsdf;
