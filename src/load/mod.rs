@@ -38,6 +38,7 @@ mod texture;
 mod transform;
 mod value;
 
+pub(crate) use error::one_of;
 pub use error::{LoadError, Place};
 
 use crate::camera::Camera;
