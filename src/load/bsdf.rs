@@ -50,9 +50,10 @@ pub(super) struct Model {
     pub relief: Option<Relief>,
 }
 
-/// The model of shapes without a BSDF.
-pub(super) fn default() -> Bsdf {
-    Bsdf::Diffuse(Diffuse { reflectance: Spectrum::grey(GREY).into() })
+/// The model of shapes without a BSDF: as in Mitsuba, lights then reflect nothing.
+pub(super) fn default(shines: bool) -> Bsdf {
+    let reflectance = if shines { 0.0 } else { GREY };
+    Bsdf::Diffuse(Diffuse { reflectance: Spectrum::grey(reflectance).into() })
 }
 
 /// The model as it is on a surface whose normal points the other way.
@@ -281,9 +282,9 @@ mod tests {
     fn turned_models_mirror() {
         let glass = Dielectric { eta: 1.5, specular_reflectance: Spectrum::ONE, specular_transmittance: Spectrum::ONE };
         let mirror = Conductor { index: None, specular_reflectance: Spectrum::grey(0.9).into() };
-        let sides = Bsdf::TwoSided(Box::new([default(), Bsdf::Conductor(mirror.clone())]));
+        let sides = Bsdf::TwoSided(Box::new([default(false), Bsdf::Conductor(mirror.clone())]));
         let mut stream = Stream::new(1, &[]);
-        for bsdf in [default(), Bsdf::Conductor(mirror), Bsdf::Dielectric(glass), sides] {
+        for bsdf in [default(false), Bsdf::Conductor(mirror), Bsdf::Dielectric(glass), sides] {
             let other = turned(bsdf.clone());
             for wi in [DVec3::new(0.6, 0.0, 0.8), DVec3::new(0.0, 0.28, -0.96)] {
                 let row = stream.row();

@@ -130,7 +130,7 @@ struct Reader {
     shapes: usize,
     triangles: usize,
     /// Scattering models in use, by node and by whether they are turned over.
-    bsdfs: HashMap<(Option<At>, bool), BsdfId>,
+    bsdfs: HashMap<(Option<At>, bool, bool), BsdfId>,
     warnings: Vec<String>,
 }
 
@@ -187,7 +187,7 @@ impl Reader {
     /// Adds a shape that `to_world` places once more.
     fn member(&mut self, element: Element<'_>, to_world: &DAffine3) -> Result<(), LoadError> {
         let shape = shape::read(element, to_world)?;
-        let bsdf = self.bsdf(shape.bsdf, shape.turned)?;
+        let bsdf = self.bsdf(shape.bsdf, shape.turned, shape.radiance.is_some())?;
         if let Some(bytes) = &shape.file {
             self.builder.fingerprint(bytes);
         }
@@ -206,14 +206,14 @@ impl Reader {
     }
 
     /// The model of `element`, added to the scene when it is first used; a grey one where there is none.
-    fn bsdf(&mut self, element: Option<Element<'_>>, turned: bool) -> Result<BsdfId, LoadError> {
-        let key = (element.map(Element::key), turned);
+    fn bsdf(&mut self, element: Option<Element<'_>>, turned: bool, shines: bool) -> Result<BsdfId, LoadError> {
+        let key = (element.map(Element::key), turned, shines && element.is_none());
         if let Some(id) = self.bsdfs.get(&key) {
             return Ok(*id);
         }
         let Model { bsdf, relief } = match element {
             Some(element) => bsdf::read(element)?,
-            None => Model { bsdf: bsdf::default(), relief: None },
+            None => Model { bsdf: bsdf::default(shines), relief: None },
         };
         let id = self.builder.bsdf(if turned { bsdf::turned(bsdf) } else { bsdf });
         if let Some(relief) = relief {
