@@ -123,9 +123,9 @@ fn transformations_apply_in_order() {
     assert!(position.is_some_and(|p| (p - DVec3::new(0.0, 1.0, 3.5)).length() < 1e-12), "{position:?}");
 }
 
-/// The hash changes with everything that decides the image, meshes included.
+/// The hash changes with everything that decides the image, other files included.
 #[test]
-fn the_hash_covers_the_meshes() {
+fn the_hash_covers_all_files() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.xml");
     let shape = "<shape type=\"obj\"><string name=\"filename\" value=\"a.obj\"/></shape>";
@@ -134,6 +134,15 @@ fn the_hash_covers_the_meshes() {
         std::fs::write(folder.path().join("a.obj"), mesh).unwrap();
         load::read(&path, &Options::default()).unwrap_or_else(|error| panic!("{error}")).scene.hash
     };
+    let spectrum = |text: &str| {
+        let light = "<emitter type=\"point\"><spectrum name=\"intensity\" filename=\"s.spd\"/></emitter>";
+        std::fs::write(folder.path().join("s.spd"), text).unwrap();
+        std::fs::write(folder.path().join("lit.xml"), format!("<scene version=\"3.0.0\">{SENSOR}{light}</scene>"))
+            .unwrap();
+        let loaded = load::read(&folder.path().join("lit.xml"), &Options::default());
+        loaded.unwrap_or_else(|error| panic!("{error}")).scene.hash
+    };
+    assert_ne!(spectrum("400 1\n700 1"), spectrum("400 1\n700 2"));
     let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     assert_eq!(hash(triangle), hash(triangle));
     assert_ne!(hash(triangle), hash(&triangle.replace("1 0 0", "2 0 0")));

@@ -5,6 +5,8 @@ use super::files::{At, Files};
 use super::references;
 use super::source::Source;
 use super::value::Text;
+use crate::scene::Builder;
+use std::cell::RefCell;
 use std::collections::HashMap;
 
 pub(super) type Node<'a> = roxmltree::Node<'a, 'a>;
@@ -22,12 +24,15 @@ pub(super) struct Document<'a> {
     /// Whether a file is in the format of Mitsuba 0.5 and 0.6.
     legacy: Vec<bool>,
     ids: HashMap<String, (usize, Node<'a>)>,
+    /// Fingerprints of what else was read: files with spectra.
+    read: RefCell<Vec<blake3::Hash>>,
 }
 
 impl<'a> Document<'a> {
     /// The scene in `files`, of which `trees` has the trees in the same order.
     pub fn new(files: &'a Files, trees: &'a [Tree<'a>]) -> Result<Self, LoadError> {
-        let mut document = Self { files, trees, legacy: vec![false; trees.len()], ids: HashMap::new() };
+        let legacy = vec![false; trees.len()];
+        let mut document = Self { files, trees, legacy, ids: HashMap::new(), read: RefCell::default() };
         document.versions()?;
         for (file, tree) in trees.iter().enumerate() {
             for node in tree.root_element().descendants().filter(Node::is_element) {
@@ -105,6 +110,16 @@ impl<'a> Document<'a> {
             Some((file, node)) => Ok(Element { document: self, file: *file, node: *node }),
             None => Err(unknown(&id)),
         }
+    }
+
+    /// Notes that the image depends on these bytes of another file.
+    pub fn depends_on(&self, bytes: &[u8]) {
+        self.read.borrow_mut().push(blake3::hash(bytes));
+    }
+
+    /// Adds all such files to the scene's fingerprint.
+    pub fn fingerprint(&self, builder: &mut Builder) {
+        self.read.borrow().iter().for_each(|hash| builder.fingerprint(hash.as_bytes()));
     }
 
     /// All elements, file by file.
