@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use glam::{DVec2, DVec3, Vec3};
-use pathblend::bsdf::{Bsdf, Conductor, Dielectric, Diffuse, Distribution, Microfacet, RoughConductor};
+use pathblend::bsdf::{Bsdf, Conductor, Dielectric, Diffuse, Distribution, RoughConductor, Roughness};
 use pathblend::camera::Camera;
 use pathblend::film::Filter;
 use pathblend::geometry::Solid;
@@ -99,7 +99,7 @@ fn a_glowing_room_is_a_geometric_series() {
     let (reflectance, max_depth) = (0.5, 5);
     let mut builder = Builder::new();
     let paint = builder.bsdf(diffuse(reflectance));
-    builder.mesh(room(), paint, Some(Spectrum::ONE)).unwrap();
+    builder.mesh(room(), paint, Some(Spectrum::ONE.into())).unwrap();
     // Off the corners: there a photon gather's disk reaches past the wall.
     let scene = build(builder, camera(DVec3::new(0.1, 0.2, 0.0), DVec3::new(0.05, 0.02, 1.0), 0.3), max_depth);
     for method in METHODS {
@@ -156,7 +156,7 @@ fn a_sphere_light_has_its_form_factor() {
     builder.solid(Solid::disk(DVec3::ZERO, DVec3::Z, 10.0), paint, None).unwrap();
     let black = builder.bsdf(diffuse(0.0));
     let lamp = Solid::sphere(DVec3::new(0.0, 0.0, 3.0), 1.0);
-    builder.solid(lamp, black, Some(Spectrum::grey(4.0))).unwrap();
+    builder.solid(lamp, black, Some(Spectrum::grey(4.0).into())).unwrap();
     // Below the sphere, as the camera must not block or see it.
     let scene = build(builder, camera(DVec3::new(0.0, 0.0, 1.0), -DVec3::Z, 1e-3), 3);
     for method in METHODS {
@@ -206,7 +206,7 @@ fn a_lamp_under_glass_is_dimmed_by_the_squared_index() {
     let mut builder = Builder::new();
     let black = builder.bsdf(diffuse(0.0));
     let lamp = Solid::disk(DVec3::ZERO, DVec3::Z, 1.0);
-    builder.solid(lamp, black, Some(Spectrum::grey(3.0))).unwrap();
+    builder.solid(lamp, black, Some(Spectrum::grey(3.0).into())).unwrap();
     let glass = builder.bsdf(Bsdf::Dielectric(Dielectric {
         eta: 1.5,
         specular_reflectance: Spectrum::ONE,
@@ -226,17 +226,17 @@ fn the_unbiased_methods_agree_class_by_class() {
     let mut builder = Builder::new();
     let paint = builder.bsdf(diffuse(0.6));
     builder.mesh(room(), paint, None).unwrap();
-    let mirror = Conductor { index: None, specular_reflectance: Spectrum::grey(0.9) };
-    let microfacet = |alpha| Microfacet { distribution: Distribution::Ggx, alpha };
+    let mirror = Conductor { index: None, specular_reflectance: Spectrum::grey(0.9).into() };
+    let roughness = |alpha| Roughness::isotropic(Distribution::Ggx, alpha);
     let bodies = [
         Bsdf::Dielectric(Dielectric {
             eta: 1.5,
             specular_reflectance: Spectrum::ONE,
             specular_transmittance: Spectrum::ONE,
         }),
-        Bsdf::Conductor(mirror),
-        Bsdf::RoughConductor(RoughConductor { metal: mirror, microfacet: microfacet(0.3) }),
-        Bsdf::RoughConductor(RoughConductor { metal: mirror, microfacet: microfacet(0.12) }),
+        Bsdf::Conductor(mirror.clone()),
+        Bsdf::RoughConductor(RoughConductor { metal: mirror.clone(), roughness: roughness(0.3) }),
+        Bsdf::RoughConductor(RoughConductor { metal: mirror.clone(), roughness: roughness(0.12) }),
     ];
     for (i, body) in bodies.into_iter().enumerate() {
         let bsdf = builder.bsdf(body);
@@ -245,7 +245,7 @@ fn the_unbiased_methods_agree_class_by_class() {
     }
     let black = builder.bsdf(diffuse(0.0));
     let lamp = Solid::disk(DVec3::new(0.0, 0.99, 0.0), -DVec3::Y, 0.4);
-    builder.solid(lamp, black, Some(Spectrum::grey(10.0))).unwrap();
+    builder.solid(lamp, black, Some(Spectrum::grey(10.0).into())).unwrap();
     let scene = build(builder, camera(DVec3::new(0.0, -0.2, -0.9), DVec3::new(0.0, -0.5, 1.0), 0.6), 6);
     let classes = ["LDE", "LSE", "LDDE", "LDSE", "LSDE", "LDDDE", "LSSDE", "LDSSE", "LDDDDE"];
     let values = |image: &Image| -> Vec<f64> {

@@ -3,11 +3,12 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use glam::DVec3;
-use pathblend::bsdf::{Bsdf, Conductor, Dielectric, Diffuse, Distribution, Microfacet, RoughConductor};
+use pathblend::bsdf::{Bsdf, Conductor, Dielectric, Diffuse, Distribution, RoughConductor, Roughness};
 use pathblend::film::Filter;
 use pathblend::load::{self, Options, UNBOUNDED_DEPTH};
 use pathblend::scene::{Caster, Scene};
 use pathblend::spectrum::Spectrum;
+use pathblend::texture::Colour;
 
 const SENSOR: &str = "<sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/></sensor>";
 
@@ -36,7 +37,7 @@ fn glass(eta: f64) -> Bsdf {
     Bsdf::Dielectric(Dielectric { eta, specular_reflectance: one, specular_transmittance: one })
 }
 
-const MIRROR: Conductor = Conductor { index: None, specular_reflectance: Spectrum::ONE };
+const MIRROR: Conductor = Conductor { index: None, specular_reflectance: Colour::Constant(Spectrum::ONE) };
 
 #[test]
 fn bsdfs_have_mitsubas_defaults() {
@@ -44,8 +45,8 @@ fn bsdfs_have_mitsubas_defaults() {
     assert_eq!(bsdfs("<bsdf type=\"diffuse\"/>"), [grey(0.5)]);
     assert_eq!(bsdfs("<bsdf type=\"conductor\"/>"), [Bsdf::Conductor(MIRROR)]);
     assert_eq!(bsdfs("<bsdf type=\"dielectric\"/>"), [glass(1.5046 / 1.000277)]);
-    let microfacet = Microfacet { distribution: Distribution::Beckmann, alpha: 0.1 };
-    let rough = Bsdf::RoughConductor(RoughConductor { metal: MIRROR, microfacet });
+    let roughness = Roughness::isotropic(Distribution::Beckmann, 0.1);
+    let rough = Bsdf::RoughConductor(RoughConductor { metal: MIRROR, roughness });
     assert_eq!(bsdfs("<bsdf type=\"roughconductor\"/>"), [rough]);
 }
 
@@ -55,9 +56,9 @@ fn bsdfs_have_their_parameters() {
         <rgb name="eta" value="0.2, 0.92, 1.1"/> <spectrum name="k" value="2.5"/> <float name="alpha" value="0.3"/>
         <string name="distribution" value="ggx"/> <float name="specular_reflectance" value="0.9"/></bsdf>"#;
     let index = Some((Spectrum::rgb(0.2, 0.92, 1.1), Spectrum::grey(2.5)));
-    let metal = Conductor { index, specular_reflectance: Spectrum::grey(0.9) };
-    let microfacet = Microfacet { distribution: Distribution::Ggx, alpha: 0.3 };
-    assert_eq!(bsdfs(copper), [Bsdf::RoughConductor(RoughConductor { metal, microfacet })]);
+    let metal = Conductor { index, specular_reflectance: Spectrum::grey(0.9).into() };
+    let roughness = Roughness::isotropic(Distribution::Ggx, 0.3);
+    assert_eq!(bsdfs(copper), [Bsdf::RoughConductor(RoughConductor { metal, roughness })]);
     let diamond = r#"<bsdf type="dielectric"><string name="int_ior" value="Diamond"/>
         <float name="ext_ior" value="1.25"/></bsdf>"#;
     assert_eq!(bsdfs(diamond), [glass(2.419 / 1.25)]);

@@ -1,5 +1,6 @@
 //! Smooth boundary between two transparent media.
 
+use super::lobes::unchoose;
 use super::{Letter, Scatter, fresnel};
 use crate::math::{Row, SolidAnglePdf, Walk};
 use crate::spectrum::Spectrum;
@@ -55,13 +56,8 @@ impl Dielectric {
 
     pub(super) fn invert(&self, wi: DVec3, wo: DVec3, gamma: Row) -> Option<Row> {
         let (reflectance, _) = fresnel::dielectric(wi.z.abs(), self.relative_eta(wi));
-        let lobe = if wi.z * wo.z > 0.0 {
-            gamma[0] * reflectance
-        } else if reflectance < 1.0 {
-            reflectance + gamma[0] * (1.0 - reflectance)
-        } else {
-            return None;
-        };
-        Some([lobe, gamma[1], gamma[2], gamma[3]])
+        let reflects = wi.z * wo.z > 0.0;
+        let lobe = unchoose((reflects, gamma[0]), reflectance);
+        (reflects || reflectance < 1.0).then_some([lobe, gamma[1], gamma[2], gamma[3]])
     }
 }

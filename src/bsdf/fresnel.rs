@@ -16,6 +16,17 @@ pub fn dielectric(cos_i: f64, eta: f64) -> (f64, Option<f64>) {
     (0.5 * (parallel * parallel + perpendicular * perpendicular), Some(cos_t))
 }
 
+/// Reflectance of a dielectric boundary for diffuse light, by the fits of Egan and Hilgeman (1973) for `eta` < 1 and
+/// of d'Eon and Irving (2011) for others: as Mitsuba has it.
+pub fn diffuse_reflectance(eta: f64) -> f64 {
+    let over = 1.0 / eta;
+    if eta < 1.0 {
+        return 0.0636 * over + 0.6681 + eta * (0.7099 - 1.4399 * eta);
+    }
+    const TERMS: [f64; 6] = [-1.36881, 4.98554, -7.80989, 6.75335, -3.4793, 0.919317];
+    TERMS.iter().fold(0.0, |sum, term| sum * over + term)
+}
+
 /// Reflectance of a metal with complex refractive index `eta` + i `k`, relative to the medium outside.
 #[inline]
 pub fn conductor(cos_i: f64, eta: Spectrum, k: Spectrum) -> Spectrum {
@@ -34,7 +45,8 @@ fn conductor_channel(cos_i: f64, eta: f64, k: f64) -> f64 {
     let rs = (a2_plus_b2 + cos2 - 2.0 * a * cos_i) / (a2_plus_b2 + cos2 + 2.0 * a * cos_i);
     let t3 = cos2 * a2_plus_b2 + sin2 * sin2;
     let t4 = 2.0 * a * cos_i * sin2;
-    let rp = rs * (t3 - t4) / (t3 + t4);
+    // Nothing over nothing where the light comes straight and η = k = 0.
+    let rp = if t3 + t4 > 0.0 { rs * (t3 - t4) / (t3 + t4) } else { rs };
     0.5 * (rs + rp)
 }
 

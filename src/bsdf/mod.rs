@@ -8,18 +8,41 @@
 //! A new variant: its file with `evaluate`, `sample`, `invert` side by side, one arm in each match below, one line in
 //! the law tests at the end. The compiler lists the arms.
 
+mod blend;
 mod conductor;
 mod dielectric;
 mod diffuse;
 pub mod fresnel;
+mod lobes;
+mod mask;
 mod microfacet;
+mod phong;
+mod plastic;
+mod principled;
+mod rough_coat;
 mod rough_conductor;
+mod rough_dielectric;
+mod rough_plastic;
+mod slopes;
+mod substrate;
+mod thin_dielectric;
+mod traits;
 
+pub use blend::Blend;
 pub use conductor::Conductor;
 pub use dielectric::Dielectric;
 pub use diffuse::Diffuse;
-pub use microfacet::{Distribution, Microfacet};
+pub use mask::Mask;
+pub use microfacet::{Distribution, Microfacet, Roughness};
+pub use phong::Phong;
+pub use plastic::Plastic;
+pub use principled::Principled;
+pub use rough_coat::RoughCoat;
 pub use rough_conductor::RoughConductor;
+pub use rough_dielectric::RoughDielectric;
+pub use rough_plastic::RoughPlastic;
+pub use substrate::Substrate;
+pub use thin_dielectric::ThinDielectric;
 
 use crate::math::{Row, SolidAnglePdf, Walk};
 use crate::spectrum::Spectrum;
@@ -82,10 +105,30 @@ pub enum Bsdf {
     Conductor(Conductor),
     /// Smooth boundary between two transparent media.
     Dielectric(Dielectric),
+    /// A thin pane.
+    ThinDielectric(ThinDielectric),
+    /// Nothing: light passes straight on.
+    Null,
     /// Microfacet reflection by a metal on the side of the normal.
     RoughConductor(RoughConductor),
+    /// Microfacet boundary between two transparent media.
+    RoughDielectric(RoughDielectric),
+    /// A diffuse base under a smooth coat, on the side of the normal.
+    Plastic(Plastic),
+    /// A diffuse base under a rough coat, on the side of the normal.
+    RoughPlastic(Box<RoughPlastic>),
+    /// The modified Phong model on the side of the normal.
+    Phong(Phong),
+    /// Burley's model.
+    Principled(Box<Principled>),
+    /// A model with gaps.
+    Mask(Mask),
+    /// A mixture of two models.
+    Blend(Blend),
     /// One model for each side of the surface: on the side of the normal, and on the other.
     TwoSided(Box<[Bsdf; 2]>),
+    /// A model as it is on a surface whose normal points the other way.
+    Turned(Box<Bsdf>),
 }
 
 /// Mirrors at the plane of the surface.
@@ -94,93 +137,84 @@ fn flip(w: DVec3) -> DVec3 {
     DVec3::new(w.x, w.y, -w.z)
 }
 
+/// Straight on, the only thing that [`Bsdf::Null`] does.
+#[inline]
+fn pass(wi: DVec3) -> Scatter {
+    Scatter::delta(-wi, Spectrum::ONE, 1.0, 1.0)
+}
+
 impl Bsdf {
     /// Value, densities and letter for a pair of directions; `None` where the value is zero, always so for delta lobes.
     #[inline]
     pub fn evaluate(&self, uv: DVec2, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
         match self {
             Self::Diffuse(diffuse) => diffuse.evaluate(uv, wi, wo),
-            Self::RoughConductor(rough) => rough.evaluate(wi, wo),
-            Self::Conductor(_) | Self::Dielectric(_) => None,
+            Self::RoughConductor(rough) => rough.evaluate(uv, wi, wo),
+            Self::RoughDielectric(rough) => rough.evaluate(uv, wi, wo, walk),
+            Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) | Self::Null => None,
+            Self::Plastic(plastic) => plastic.evaluate(uv, wi, wo),
+            Self::RoughPlastic(plastic) => plastic.evaluate(uv, wi, wo),
+            Self::Phong(phong) => phong.evaluate(uv, wi, wo),
+            Self::Principled(principled) => principled.evaluate(uv, wi, wo, walk),
+            Self::Mask(mask) => mask.evaluate(uv, wi, wo, walk),
+            Self::Blend(blend) => blend.evaluate(uv, wi, wo, walk),
             Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].evaluate(uv, wi, wo, walk),
             Self::TwoSided(sides) => sides[1].evaluate(uv, flip(wi), flip(wo), walk),
+            Self::Turned(bsdf) => bsdf.evaluate(uv, flip(wi), flip(wo), walk),
         }
     }
 
     /// Samples a direction from the first three numbers of `row`; `None` where light is absorbed.
     #[inline]
     pub fn sample(&self, uv: DVec2, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
+        let turned = |bsdf: &Self| {
+            let scatter = bsdf.sample(uv, flip(wi), row, walk)?;
+            Some(Scatter { direction: flip(scatter.direction), ..scatter })
+        };
         match self {
             Self::Diffuse(diffuse) => diffuse.sample(uv, wi, row),
-            Self::RoughConductor(rough) => rough.sample(wi, row),
-            Self::Conductor(conductor) => conductor.sample(wi),
+            Self::RoughConductor(rough) => rough.sample(uv, wi, row),
+            Self::RoughDielectric(rough) => rough.sample(uv, wi, row, walk),
+            Self::Conductor(conductor) => conductor.sample(uv, wi),
             Self::Dielectric(dielectric) => dielectric.sample(wi, row, walk),
+            Self::ThinDielectric(pane) => pane.sample(wi, row),
+            Self::Null => Some(pass(wi)),
+            Self::Plastic(plastic) => plastic.sample(uv, wi, row),
+            Self::RoughPlastic(plastic) => plastic.sample(uv, wi, row),
+            Self::Phong(phong) => phong.sample(uv, wi, row),
+            Self::Principled(principled) => principled.sample(uv, wi, row, walk),
+            Self::Mask(mask) => mask.sample(uv, wi, row, walk),
+            Self::Blend(blend) => blend.sample(uv, wi, row, walk),
             Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].sample(uv, wi, row, walk),
-            Self::TwoSided(sides) => {
-                let scatter = sides[1].sample(uv, flip(wi), row, walk)?;
-                Some(Scatter { direction: flip(scatter.direction), ..scatter })
-            }
+            Self::TwoSided(sides) => turned(&sides[1]),
+            Self::Turned(bsdf) => turned(bsdf),
         }
     }
 
     /// A row that [`Bsdf::sample`] takes from `wi` to `wo`; numbers that the sampling leaves open are taken from
-    /// `gamma`. `delta` says whether a delta lobe is to be chosen, which the directions alone do not. `None` where `wo`
-    /// cannot be sampled so.
+    /// `gamma`, and so is the lobe where several lead to `wo`. `delta` says whether a delta lobe is to be chosen, which
+    /// the directions alone do not. `None` where `wo` cannot be sampled so.
     pub fn invert(&self, uv: DVec2, wi: DVec3, wo: DVec3, delta: bool, gamma: Row) -> Option<Row> {
-        if !delta && self.is_delta(wi) {
+        if if delta { !self.has_delta(wi) } else { self.is_delta(wi) } {
             return None;
         }
         match self {
-            Self::Diffuse(_) | Self::RoughConductor(_) if delta => None,
             Self::Diffuse(diffuse) => diffuse.invert(wi, wo, gamma),
-            Self::RoughConductor(rough) => rough.invert(wi, wo, gamma),
+            Self::RoughConductor(rough) => rough.invert(uv, wi, wo, gamma),
+            Self::RoughDielectric(rough) => rough.invert(uv, wi, wo, gamma),
             Self::Conductor(conductor) => conductor.invert(wi, wo, gamma),
             Self::Dielectric(dielectric) => dielectric.invert(wi, wo, gamma),
+            Self::ThinDielectric(pane) => pane.invert(wi, wo, gamma),
+            Self::Null => (wi.z * wo.z < 0.0).then_some(gamma),
+            Self::Plastic(plastic) => plastic.invert(uv, wi, wo, delta, gamma),
+            Self::RoughPlastic(plastic) => plastic.invert(uv, wi, wo, gamma),
+            Self::Phong(phong) => phong.invert(uv, wi, wo, gamma),
+            Self::Principled(principled) => principled.invert(uv, wi, wo, gamma),
+            Self::Mask(mask) => mask.invert(uv, wi, wo, delta, gamma),
+            Self::Blend(blend) => blend.invert(uv, wi, wo, delta, gamma),
             Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].invert(uv, wi, wo, delta, gamma),
             Self::TwoSided(sides) => sides[1].invert(uv, flip(wi), flip(wo), delta, gamma),
-        }
-    }
-
-    /// Whether all lobes for light from `wi` are Dirac densities, so that no connection can be made there.
-    #[inline]
-    pub fn is_delta(&self, wi: DVec3) -> bool {
-        match self {
-            Self::Diffuse(_) | Self::RoughConductor(_) => false,
-            Self::Conductor(_) | Self::Dielectric(_) => true,
-            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].is_delta(wi),
-            Self::TwoSided(sides) => sides[1].is_delta(flip(wi)),
-        }
-    }
-
-    /// Whether it is the same everywhere, so that texture coordinates do not matter.
-    pub fn is_constant(&self) -> bool {
-        match self {
-            Self::Diffuse(diffuse) => diffuse.reflectance.is_constant(),
-            Self::Conductor(_) | Self::Dielectric(_) | Self::RoughConductor(_) => true,
-            Self::TwoSided(sides) => sides.iter().all(Bsdf::is_constant),
-        }
-    }
-
-    /// Whether some lobes for light from `wi` are Dirac densities, so that a walk may go on by one.
-    #[inline]
-    pub fn has_delta(&self, wi: DVec3) -> bool {
-        match self {
-            Self::Diffuse(_) | Self::RoughConductor(_) => false,
-            Self::Conductor(_) | Self::Dielectric(_) => true,
-            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].has_delta(wi),
-            Self::TwoSided(sides) => sides[1].has_delta(flip(wi)),
-        }
-    }
-
-    /// Whether light that arrives from `wi` leaves diffuse-like: where photons are gathered.
-    #[inline]
-    pub fn gathers(&self, wi: DVec3) -> bool {
-        match self {
-            Self::Diffuse(_) => true,
-            Self::RoughConductor(rough) => rough.letter() == Letter::D,
-            Self::Conductor(_) | Self::Dielectric(_) => false,
-            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].gathers(wi),
-            Self::TwoSided(sides) => sides[1].gathers(flip(wi)),
+            Self::Turned(bsdf) => bsdf.invert(uv, flip(wi), flip(wo), delta, gamma),
         }
     }
 }

@@ -1,67 +1,56 @@
 //! Microfacet reflection by a metal (Walter et al. 2007, with the separable shadowing term).
 
-use super::{Conductor, Evaluation, GLOSSY_ALPHA, Letter, Microfacet, Scatter};
+use super::{Conductor, Evaluation, Roughness, Scatter};
 use crate::math::{Row, SolidAnglePdf};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 /// A rough metal.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RoughConductor {
     /// The metal that the facets are made of.
     pub metal: Conductor,
     /// The distribution of the facets.
-    pub microfacet: Microfacet,
+    pub roughness: Roughness,
 }
 
 impl RoughConductor {
-    /// The letter depends on the roughness alone.
-    #[inline]
-    pub(super) fn letter(&self) -> Letter {
-        if self.microfacet.alpha < GLOSSY_ALPHA { Letter::S } else { Letter::D }
-    }
-
     /// Walter et al. 2007, eq. 20.
     #[inline]
-    pub(super) fn evaluate(&self, wi: DVec3, wo: DVec3) -> Option<Evaluation> {
+    pub(super) fn evaluate(&self, uv: DVec2, wi: DVec3, wo: DVec3) -> Option<Evaluation> {
         if wi.z <= 0.0 || wo.z <= 0.0 {
             return None;
         }
+        let microfacet = self.roughness.at(uv);
         let h = (wi + wo).normalize();
-        let density = self.microfacet.density(h);
+        let density = microfacet.density(h);
         if density == 0.0 {
             return None;
         }
         let cos = wi.dot(h);
-        let shadowing = self.microfacet.shadowing(wi) * self.microfacet.shadowing(wo);
+        let shadowing = microfacet.shadowing(wi, h) * microfacet.shadowing(wo, h);
         Some(Evaluation {
-            value: self.metal.reflectance(cos) * (density * shadowing / (4.0 * wi.z * wo.z)),
-            pdf: SolidAnglePdf(self.microfacet.pdf(wi, h) / (4.0 * cos)),
-            pdf_reverse: SolidAnglePdf(self.microfacet.pdf(wo, h) / (4.0 * cos)),
-            letter: self.letter(),
+            value: self.metal.reflectance(uv, cos) * (density * shadowing / (4.0 * wi.z * wo.z)),
+            pdf: SolidAnglePdf(microfacet.pdf(wi, h) / (4.0 * cos)),
+            pdf_reverse: SolidAnglePdf(microfacet.pdf(wo, h) / (4.0 * cos)),
+            letter: microfacet.letter(),
         })
     }
 
     #[inline]
-    pub(super) fn sample(&self, wi: DVec3, row: Row) -> Option<Scatter> {
+    pub(super) fn sample(&self, uv: DVec2, wi: DVec3, row: Row) -> Option<Scatter> {
         if wi.z <= 0.0 {
             return None;
         }
-        let h = self.microfacet.sample(wi, [row[1], row[2]]);
+        let h = self.roughness.at(uv).sample(wi, [row[1], row[2]]);
         let direction = h * (2.0 * wi.dot(h)) - wi;
-        let evaluation = self.evaluate(wi, direction)?;
-        (evaluation.pdf.0 > 0.0).then(|| Scatter {
-            direction,
-            weight: evaluation.value * (direction.z / evaluation.pdf.0),
-            pdf: evaluation.pdf,
-            pdf_reverse: evaluation.pdf_reverse,
-            delta: false,
-            letter: evaluation.letter,
-            eta: 1.0,
-        })
+        Scatter::of(direction, &self.evaluate(uv, wi, direction)?, 1.0)
     }
 
-    pub(super) fn invert(&self, wi: DVec3, wo: DVec3, gamma: Row) -> Option<Row> {
-        let [u, v] = self.microfacet.invert(wi, (wi + wo).normalize());
-        (wi.z > 0.0 && wo.z > 0.0).then_some([gamma[0], u, v, gamma[3]])
+    pub(super) fn invert(&self, uv: DVec2, wi: DVec3, wo: DVec3, gamma: Row) -> Option<Row> {
+        if wi.z <= 0.0 || wo.z <= 0.0 {
+            return None;
+        }
+        let [u, v] = self.roughness.at(uv).invert(wi, (wi + wo).normalize());
+        Some([gamma[0], u, v, gamma[3]])
     }
 }

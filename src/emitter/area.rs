@@ -1,19 +1,21 @@
-//! Surfaces that shine evenly into the hemisphere of their normal.
+//! Surfaces that shine evenly into the hemisphere of their normal; how much may vary over the surface.
 
 use super::Start;
 use crate::geometry::Solid;
 use crate::math::{AreaPdf, Discrete, Frame, Row, SolidAnglePdf, warp};
 use crate::spectrum::Spectrum;
-use glam::DVec3;
+use crate::texture::Colour;
+use glam::{DVec2, DVec3, Vec2};
 use std::f64::consts::{FRAC_1_PI, PI};
 
 /// A shining surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Area {
     /// Radiance on the side of the normal, in W/(m² sr).
-    pub radiance: Spectrum,
+    pub radiance: Colour,
     surface: Surface,
     inverse_area: f64,
+    power: f64,
 }
 
 /// A triangle as light is sampled on it.
@@ -23,7 +25,12 @@ pub struct Facet {
     edges: [DVec3; 2],
     normal: DVec3,
     area: f64,
+    /// Texture coordinates of the corners.
+    uvs: [Vec2; 3],
 }
+
+/// Along each side of a triangle so many points tell how bright a textured one is.
+const PROBES: usize = 4;
 
 /// A surface that points are sampled on.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,10 +47,10 @@ pub enum Surface {
 }
 
 impl Surface {
-    /// The surface of triangles with the given corners, counter-clockwise as seen from the shining side; `None` when
-    /// their area is zero or not finite.
-    pub fn triangles(corners: impl Iterator<Item = [DVec3; 3]>) -> Option<Self> {
-        let facets: Vec<Facet> = corners.map(Facet::new).collect();
+    /// The surface of triangles with the given corners, counter-clockwise as seen from the shining side, and their
+    /// texture coordinates; `None` when their area is zero or not finite.
+    pub fn triangles(corners: impl Iterator<Item = ([DVec3; 3], [Vec2; 3])>) -> Option<Self> {
+        let facets: Vec<Facet> = corners.map(|(corners, uvs)| Facet::new(corners, uvs)).collect();
         let areas: Vec<f64> = facets.iter().map(|facet| facet.area).collect();
         Some(Self::Triangles { choice: Discrete::new(&areas)?, facets })
     }
@@ -56,52 +63,77 @@ impl Surface {
         }
     }
 
-    /// A point with its normal, uniformly by area.
+    /// A point with its normal and texture coordinates, uniformly by area.
     #[inline]
-    fn sample(&self, row: Row) -> (DVec3, DVec3) {
+    fn sample(&self, row: Row) -> (DVec3, DVec3, DVec2) {
         match self {
             Self::Triangles { facets, choice } => {
                 let (index, u) = choice.sample(row[1]);
                 let facet = &facets[index];
                 let at = warp::triangle::sample([u, row[2]]);
-                (facet.corner + facet.edges[0] * at.x + facet.edges[1] * at.y, facet.normal)
+                (facet.corner + facet.edges[0] * at.x + facet.edges[1] * at.y, facet.normal, facet.uv(at))
             }
             Self::Solid(Solid::Sphere { center, radius, .. }) => {
                 let normal = warp::sphere::sample([row[1], row[2]]);
-                (*center + normal * *radius, normal)
+                (*center + normal * *radius, normal, DVec2::ZERO)
             }
             Self::Solid(Solid::Disk { center, normal, radius, .. }) => {
                 let at = warp::disk::sample([row[1], row[2]]) * *radius;
                 let frame = Frame::around(*normal);
-                (*center + frame.tangent * at.x + frame.bitangent * at.y, *normal)
+                (*center + frame.tangent * at.x + frame.bitangent * at.y, *normal, DVec2::ZERO)
             }
             Self::Solid(Solid::Cylinder { bottom, axes, length, radius }) => {
                 let (sin, cos) = (2.0 * PI * row[1]).sin_cos();
                 let normal = axes.tangent * cos + axes.bitangent * sin;
-                (*bottom + axes.normal * (row[2] * *length) + normal * *radius, normal)
+                (*bottom + axes.normal * (row[2] * *length) + normal * *radius, normal, DVec2::ZERO)
             }
+        }
+    }
+
+    /// The integral of `radiance` over the surface, as a luminance; of a texture by some points on each triangle.
+    fn integral(&self, radiance: &Colour) -> f64 {
+        match self {
+            Self::Triangles { facets, .. } if !radiance.is_constant() => {
+                facets.iter().map(|facet| facet.area * facet.mean(radiance)).sum()
+            }
+            _ => self.area() * radiance.at(DVec2::ZERO).luminance(),
         }
     }
 }
 
 impl Facet {
-    fn new([a, b, c]: [DVec3; 3]) -> Self {
+    fn new([a, b, c]: [DVec3; 3], uvs: [Vec2; 3]) -> Self {
         let edges = [b - a, c - a];
         let cross = edges[0].cross(edges[1]);
-        Self { corner: a, edges, normal: cross.normalize_or_zero(), area: 0.5 * cross.length() }
+        Self { corner: a, edges, normal: cross.normalize_or_zero(), area: 0.5 * cross.length(), uvs }
+    }
+
+    /// Texture coordinates at the barycentric coordinates of the second and the third corner.
+    #[inline]
+    fn uv(&self, at: DVec2) -> DVec2 {
+        let [a, b, c] = self.uvs.map(|uv| uv.as_dvec2());
+        a * (1.0 - at.x - at.y) + b * at.x + c * at.y
+    }
+
+    fn mean(&self, radiance: &Colour) -> f64 {
+        let middle = |i: usize| (i as f64 + 0.5) / PROBES as f64;
+        let probe = |i| warp::triangle::sample([middle(i / PROBES), middle(i % PROBES)]);
+        let luminance = |i| radiance.at(self.uv(probe(i))).luminance().max(0.0);
+        (0..PROBES * PROBES).map(luminance).sum::<f64>() / (PROBES * PROBES) as f64
     }
 }
 
 impl Area {
     /// A light of `radiance` on `surface`.
-    pub fn new(radiance: Spectrum, surface: Surface) -> Self {
-        Self { radiance, inverse_area: 1.0 / surface.area(), surface }
+    pub fn new(radiance: Colour, surface: Surface) -> Self {
+        let power = surface.integral(&radiance) * PI;
+        Self { radiance, inverse_area: 1.0 / surface.area(), surface, power }
     }
 
     #[inline]
     pub(super) fn start(&self, row: Row) -> (Start, AreaPdf) {
-        let (position, normal) = self.surface.sample(row);
-        (Start::Surface { position, normal }, self.start_pdf())
+        let (position, normal, uv) = self.surface.sample(row);
+        (Start::Surface { position, normal, uv }, self.start_pdf())
     }
 
     #[inline]
@@ -110,14 +142,18 @@ impl Area {
     }
 
     #[inline]
-    pub(super) fn radiance(&self, cos: f64) -> Spectrum {
-        if cos > 0.0 { self.radiance } else { Spectrum::BLACK }
+    pub(super) fn radiance(&self, uv: DVec2, cos: f64) -> Spectrum {
+        match &self.radiance {
+            _ if cos <= 0.0 => Spectrum::BLACK,
+            Colour::Constant(radiance) => *radiance,
+            Colour::Textured(texture) => texture.colour(uv).map(|channel| channel.max(0.0)),
+        }
     }
 
     #[inline]
-    pub(super) fn emit(&self, position: DVec3, normal: DVec3, row: Row) -> (DVec3, DVec3, Spectrum) {
+    pub(super) fn emit(&self, position: DVec3, normal: DVec3, uv: DVec2, row: Row) -> (DVec3, DVec3, Spectrum) {
         let local = warp::hemisphere::sample([row[1], row[2]]);
-        (position, Frame::around(normal).to_world(local), self.radiance * PI)
+        (position, Frame::around(normal).to_world(local), self.radiance(uv, 1.0) * PI)
     }
 
     #[inline]
@@ -126,6 +162,6 @@ impl Area {
     }
 
     pub(super) fn power(&self) -> f64 {
-        self.radiance.luminance() * PI / self.inverse_area
+        self.power
     }
 }

@@ -1,8 +1,8 @@
 //! An environment of one radiance. Light subpaths start with a direction, then a point on a disk that covers the scene
 //! as seen along it.
 
-use super::Start;
-use crate::math::{AreaPdf, Frame, Row, warp};
+use super::{Reach, Start};
+use crate::math::{AreaPdf, Row, warp};
 use crate::spectrum::Spectrum;
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -12,10 +12,8 @@ use std::f64::consts::PI;
 pub struct Constant {
     /// Radiance from everywhere, in W/(m² sr).
     pub radiance: Spectrum,
-    /// Centre of a sphere around the scene.
-    pub center: DVec3,
-    /// Its radius, positive.
-    pub radius: f64,
+    /// The sphere around the scene.
+    pub reach: Reach,
 }
 
 impl Constant {
@@ -29,21 +27,12 @@ impl Constant {
         AreaPdf(warp::sphere::PDF.0)
     }
 
-    /// Density per area of the points that parallel rays pass.
-    #[inline]
-    pub(super) fn beam_pdf(&self) -> f64 {
-        warp::disk::PDF / (self.radius * self.radius)
-    }
-
     #[inline]
     pub(super) fn emit(&self, towards: DVec3, row: Row) -> (DVec3, DVec3, Spectrum) {
-        let frame = Frame::around(towards);
-        let at = warp::disk::sample([row[1], row[2]]);
-        let origin = self.center + (frame.tangent * at.x + frame.bitangent * at.y + towards) * self.radius;
-        (origin, -towards, self.radiance / self.beam_pdf())
+        (self.reach.origin(towards, row), -towards, self.radiance / self.reach.beam_pdf())
     }
 
     pub(super) fn power(&self) -> f64 {
-        self.radiance.luminance() * 4.0 * PI * PI * self.radius * self.radius
+        self.radiance.luminance() * 4.0 * PI * self.reach.shadow()
     }
 }

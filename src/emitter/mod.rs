@@ -5,15 +5,28 @@
 
 mod area;
 mod constant;
+mod directional;
+mod environment;
+mod panorama;
 mod point;
+mod reach;
+pub mod sky;
+mod spot;
+#[cfg(test)]
+mod tests;
 
 pub use area::{Area, Surface};
 pub use constant::Constant;
+pub use directional::Directional;
+pub use environment::{Backdrop, Environment, Sun};
+pub use panorama::Panorama;
 pub use point::Point;
+pub use reach::Reach;
+pub use spot::Spot;
 
 use crate::math::{AreaPdf, Row, SolidAnglePdf};
 use crate::spectrum::Spectrum;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 /// Where light starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,6 +37,8 @@ pub enum Start {
         position: DVec3,
         /// Unit normal on the shining side.
         normal: DVec3,
+        /// Texture coordinates.
+        uv: DVec2,
     },
     /// At an isolated point, which no ray can hit.
     Point {
@@ -32,6 +47,11 @@ pub enum Start {
     },
     /// Infinitely far away.
     Infinite {
+        /// Unit vector from the scene towards the source.
+        towards: DVec3,
+    },
+    /// Infinitely far away in a direction that has light alone, so that no ray can hit it.
+    Distant {
         /// Unit vector from the scene towards the source.
         towards: DVec3,
     },
@@ -44,40 +64,55 @@ pub enum Emitter {
     Area(Area),
     /// An environment of one radiance.
     Constant(Constant),
+    /// An environment that varies.
+    Environment(Environment),
     /// An isolated point that shines evenly into all directions.
     Point(Point),
+    /// An isolated point that shines into a cone.
+    Spot(Spot),
+    /// Parallel light.
+    Directional(Directional),
 }
 
 impl Emitter {
-    /// Samples a start from the two middle numbers of `row` (the first has chosen the emitter), with its density: per area, for an infinite start per
-    /// solid angle, for a point 1.
+    /// Samples a start from the two middle numbers of `row` (the first has chosen the emitter), with its density: per
+    /// area, for an infinite start per solid angle, for a start that no ray can hit 1.
     #[inline]
     pub fn start(&self, row: Row) -> (Start, AreaPdf) {
         match self {
             Self::Area(area) => area.start(row),
             Self::Constant(constant) => constant.start(row),
+            Self::Environment(environment) => environment.start(row),
             Self::Point(point) => point.start(),
+            Self::Spot(spot) => spot.start(),
+            Self::Directional(directional) => directional.start(),
         }
     }
 
-    /// Density of [`Emitter::start`]: area lights are sampled evenly, so that it is the same everywhere.
+    /// Density with which [`Emitter::start`] finds `start`.
     #[inline]
-    pub fn start_pdf(&self) -> AreaPdf {
-        match self {
-            Self::Area(area) => area.start_pdf(),
-            Self::Constant(constant) => constant.start_pdf(),
-            Self::Point(_) => AreaPdf(1.0),
+    pub fn start_pdf(&self, start: &Start) -> AreaPdf {
+        match (self, start) {
+            (Self::Area(area), _) => area.start_pdf(),
+            (Self::Constant(constant), _) => constant.start_pdf(),
+            (Self::Environment(environment), Start::Infinite { towards }) => environment.start_pdf(*towards),
+            (Self::Environment(_), _) => AreaPdf(0.0),
+            (Self::Point(_) | Self::Spot(_) | Self::Directional(_), _) => AreaPdf(1.0),
         }
     }
 
-    /// Radiance from `start` along the unit vector `direction`; for a point its intensity in W/sr.
+    /// Radiance from `start` along the unit vector `direction`; for a point its intensity in W/sr, for parallel
+    /// light its irradiance in W/m².
     #[inline]
     pub fn radiance(&self, start: &Start, direction: DVec3) -> Spectrum {
         match (self, start) {
-            (Self::Area(area), Start::Surface { normal, .. }) => area.radiance(normal.dot(direction)),
+            (Self::Area(area), Start::Surface { normal, uv, .. }) => area.radiance(*uv, normal.dot(direction)),
             (Self::Constant(constant), _) => constant.radiance,
+            (Self::Environment(environment), Start::Infinite { towards }) => environment.radiance(*towards),
             (Self::Point(point), _) => point.intensity,
-            (Self::Area(_), _) => Spectrum::BLACK,
+            (Self::Spot(spot), _) => spot.intensity(direction),
+            (Self::Directional(directional), _) => directional.irradiance,
+            (Self::Area(_) | Self::Environment(_), _) => Spectrum::BLACK,
         }
     }
 
@@ -86,9 +121,14 @@ impl Emitter {
     #[inline]
     pub fn emit(&self, start: &Start, row: Row) -> Option<(DVec3, DVec3, Spectrum)> {
         match (self, start) {
-            (Self::Area(area), Start::Surface { position, normal }) => Some(area.emit(*position, *normal, row)),
+            (Self::Area(area), Start::Surface { position, normal, uv }) => {
+                Some(area.emit(*position, *normal, *uv, row))
+            }
             (Self::Constant(constant), Start::Infinite { towards }) => Some(constant.emit(*towards, row)),
+            (Self::Environment(environment), Start::Infinite { towards }) => Some(environment.emit(*towards, row)),
             (Self::Point(point), Start::Point { position }) => Some(point.emit(*position, row)),
+            (Self::Spot(spot), Start::Point { position }) => Some(spot.emit(*position, row)),
+            (Self::Directional(directional), _) => Some(directional.emit(row)),
             _ => None,
         }
     }
@@ -100,7 +140,10 @@ impl Emitter {
             (Self::Area(area), Start::Surface { normal, .. }) => {
                 area.direction_pdf(normal.dot(direction)).to_area(cos_arrival, distance_squared)
             }
-            (Self::Constant(constant), _) => AreaPdf(constant.beam_pdf() * cos_arrival.abs()),
+            (Self::Constant(constant), _) => AreaPdf(constant.reach.beam_pdf() * cos_arrival.abs()),
+            (Self::Environment(environment), _) => AreaPdf(environment.beam_pdf() * cos_arrival.abs()),
+            (Self::Directional(directional), _) => AreaPdf(directional.reach.beam_pdf() * cos_arrival.abs()),
+            (Self::Spot(spot), _) => spot.direction_pdf(direction).to_area(cos_arrival, distance_squared),
             (Self::Point(_), _) => crate::math::warp::sphere::PDF.to_area(cos_arrival, distance_squared),
             (Self::Area(_), _) => AreaPdf(0.0),
         }
@@ -112,7 +155,7 @@ impl Emitter {
         match start {
             Start::Surface { normal, .. } => pdf.to_area(normal.dot(direction), distance_squared),
             Start::Infinite { .. } => AreaPdf(pdf.0),
-            Start::Point { .. } => AreaPdf(0.0),
+            Start::Point { .. } | Start::Distant { .. } => AreaPdf(0.0),
         }
     }
 
@@ -121,7 +164,10 @@ impl Emitter {
         match self {
             Self::Area(area) => area.power(),
             Self::Constant(constant) => constant.power(),
+            Self::Environment(environment) => environment.power(),
             Self::Point(point) => point.power(),
+            Self::Spot(spot) => spot.power(),
+            Self::Directional(directional) => directional.power(),
         }
     }
 }

@@ -64,8 +64,8 @@ pub struct SurfacePoint {
 pub struct Chart {
     /// Texture coordinates.
     pub uv: DVec2,
-    /// Derivative of the position by the first of them; zero at the poles of a sphere.
-    pub dp_du: DVec3,
+    /// Derivatives of the position by them; zero along u at the poles of a sphere.
+    pub derivatives: [DVec3; 2],
 }
 
 impl Solid {
@@ -183,20 +183,25 @@ impl Solid {
             Self::Sphere { center, radius, axes } => {
                 let local = axes.to_local(position - center);
                 let v = (local.z / radius).clamp(-1.0, 1.0).acos() / PI;
-                let dp_du = TAU * (axes.bitangent * local.x - axes.tangent * local.y);
-                Chart { uv: DVec2::new(turn(local.x, local.y), v), dp_du }
+                let around = TAU * (axes.bitangent * local.x - axes.tangent * local.y);
+                let flat = DVec2::new(local.x, local.y);
+                let outwards = flat.try_normalize().unwrap_or(DVec2::X) * local.z;
+                let down = PI * axes.to_world(outwards.extend(-flat.length()));
+                Chart { uv: DVec2::new(turn(local.x, local.y), v), derivatives: [around, down] }
             }
             Self::Disk { center, radius, axes, .. } => {
                 let away = position - center;
                 let (x, y) = (away.dot(axes[0]), away.dot(axes[1]));
                 let outwards = DVec2::new(x, y).try_normalize().unwrap_or(DVec2::X);
-                let dp_du = radius * (axes[0] * outwards.x + axes[1] * outwards.y);
-                Chart { uv: DVec2::new(x.hypot(y) / radius, turn(x, y)), dp_du }
+                let along = radius * (axes[0] * outwards.x + axes[1] * outwards.y);
+                let around = TAU * (axes[1] * x - axes[0] * y);
+                Chart { uv: DVec2::new(x.hypot(y) / radius, turn(x, y)), derivatives: [along, around] }
             }
             Self::Cylinder { bottom, axes, length, .. } => {
                 let local = axes.to_local(position - bottom);
-                let dp_du = TAU * (axes.bitangent * local.x - axes.tangent * local.y);
-                Chart { uv: DVec2::new(turn(local.x, local.y), local.z / length), dp_du }
+                let around = TAU * (axes.bitangent * local.x - axes.tangent * local.y);
+                let derivatives = [around, axes.normal * length];
+                Chart { uv: DVec2::new(turn(local.x, local.y), local.z / length), derivatives }
             }
         }
     }
@@ -253,7 +258,7 @@ mod tests {
 
     fn close(chart: Chart, uv: [f64; 2], dp_du: [f64; 3]) {
         assert!((chart.uv - DVec2::from(uv)).length() < 2e-4, "{chart:?} {uv:?}");
-        assert!((chart.dp_du - DVec3::from(dp_du)).length() < 1e-3, "{chart:?} {dp_du:?}");
+        assert!((chart.derivatives[0] - DVec3::from(dp_du)).length() < 1e-3, "{chart:?} {dp_du:?}");
     }
 
     /// What Mitsuba 3.9.1 answers at the same points.

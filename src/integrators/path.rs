@@ -70,6 +70,16 @@ impl State {
         Self { origin: origin.into(), direction, throughput: Spectrum::ONE, word: Word::EMPTY, pdf: None }
     }
 
+    /// What the walk meets next.
+    #[inline]
+    pub(super) fn next(&self, scene: &Caster<'_>) -> Option<Surface> {
+        if self.word == Word::EMPTY {
+            scene.see(self.origin, self.direction)
+        } else {
+            scene.intersect(self.origin, self.direction)
+        }
+    }
+
     /// The walk after `scatter` at `surface`, weighted by `weight`.
     #[inline]
     pub(super) fn scattered(self, surface: &Surface, scatter: &Scatter, weight: Spectrum) -> Self {
@@ -98,7 +108,7 @@ fn trace(
     let mut state = State::at_camera(scene, film_position(kernel, size, pixel, row), row);
     let mut alive = 1.0;
     for depth in 1..=max_depth {
-        let Some(surface) = scene.intersect(state.origin, state.direction) else {
+        let Some(surface) = state.next(scene) else {
             background(scene, &state, pixel, band);
             return;
         };
@@ -130,10 +140,10 @@ fn trace(
 /// Light from the environment, where the walk has left the scene.
 #[inline]
 pub(super) fn background(scene: &Caster<'_>, state: &State, pixel: [usize; 2], band: &mut Band) {
-    let Some(id) = scene.environment() else { return };
+    let Some(id) = scene.environment().filter(|_| !scene.hide_emitters || state.word != Word::EMPTY) else { return };
     let start = Start::Infinite { towards: state.direction };
     let radiance = scene.emitter(id).radiance(&start, -state.direction);
-    let weight = state.pdf.map_or(1.0, |pdf| power(pdf, direct_pdf(scene, id, None, state.direction)));
+    let weight = state.pdf.map_or(1.0, |pdf| power(pdf, direct_pdf(scene, id, &start, state.direction, 1.0)));
     band.add(pixel, state.word.class(), state.throughput * radiance * weight);
 }
 
@@ -141,14 +151,14 @@ pub(super) fn background(scene: &Caster<'_>, state: &State, pixel: [usize; 2], b
 #[inline]
 pub(super) fn emission(scene: &Caster<'_>, surface: &Surface, state: &State, pixel: [usize; 2], band: &mut Band) {
     let Some(id) = surface.emitter else { return };
-    let start = Start::Surface { position: surface.position, normal: surface.geometric };
+    let start = Start::Surface { position: surface.position, normal: surface.geometric, uv: surface.uv };
     let radiance = scene.emitter(id).radiance(&start, -state.direction);
     if radiance.is_black() {
         return;
     }
     let weight = state.pdf.map_or(1.0, |pdf| {
         let distance = surface.position.distance(state.origin.point);
-        power(pdf, direct_pdf(scene, id, Some((surface.geometric, distance)), state.direction))
+        power(pdf, direct_pdf(scene, id, &start, state.direction, distance))
     });
     band.add(pixel, state.word.class(), state.throughput * radiance * weight);
 }

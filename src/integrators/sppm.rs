@@ -125,7 +125,7 @@ impl Sppm {
         let mut state = State::at_camera(scene, film_position(kernel, size, pixel, row), row);
         let mut distance = 0.0;
         for edges in 1..=self.max_depth {
-            let Some(surface) = scene.intersect(state.origin, state.direction) else {
+            let Some(surface) = state.next(scene) else {
                 path::background(scene, &state, pixel, band);
                 return;
             };

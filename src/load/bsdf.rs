@@ -1,111 +1,273 @@
-//! `<bsdf>` elements. Parameters and defaults are those of Mitsuba 3.
+//! `<bsdf>` elements. Parameters and defaults are those of Mitsuba 3; models and parameters that only Mitsuba 0.6 has
+//! are those of 0.6.
+
+mod metals;
+mod microfacet;
+mod principled;
 
 use super::document::Element;
-use super::error::LoadError;
+use super::error::{LoadError, one_of};
 use super::ior;
 use super::plugin::Plugin;
-use crate::bsdf::{Bsdf, Conductor, Dielectric, Diffuse, Distribution, Microfacet, RoughConductor};
+use crate::bsdf::{
+    Blend, Bsdf, Conductor, Dielectric, Diffuse, Mask, Phong, Plastic, RoughConductor, RoughDielectric, RoughPlastic,
+    ThinDielectric,
+};
 use crate::spectrum::Spectrum;
+use crate::texture::{Colour, Relief};
 
-const KINDS: [&str; 5] = ["diffuse", "conductor", "roughconductor", "dielectric", "twosided"];
+const KINDS: [&str; 16] = [
+    "diffuse",
+    "conductor",
+    "roughconductor",
+    "dielectric",
+    "thindielectric",
+    "roughdielectric",
+    "plastic",
+    "roughplastic",
+    "phong",
+    "principled",
+    "null",
+    "mask",
+    "blendbsdf",
+    "twosided",
+    "bumpmap",
+    "normalmap",
+];
 
 /// Reflectance of shapes without a BSDF, and of `diffuse` without a parameter.
 const GREY: f64 = 0.5;
+
+/// Deepest nesting of models; references may run in a circle.
+const DEEPEST: usize = 16;
+
+/// Parameters that scene files carry for other renderers.
+const FOREIGN: [&str; 1] = ["use_path_guiding"];
+
+/// A scattering model, and the relief of the surface that has it.
+pub(super) struct Model {
+    pub bsdf: Bsdf,
+    pub relief: Option<Relief>,
+}
 
 /// The model of shapes without a BSDF.
 pub(super) fn default() -> Bsdf {
     Bsdf::Diffuse(Diffuse { reflectance: Spectrum::grey(GREY).into() })
 }
 
-/// Reads a scattering model.
-pub(super) fn read(element: Element<'_>) -> Result<Bsdf, LoadError> {
-    let mut plugin = Plugin::new(element)?;
-    let bsdf = match plugin.kind {
-        "diffuse" => Bsdf::Diffuse(Diffuse { reflectance: plugin.share("reflectance", GREY)?.into() }),
-        "conductor" => Bsdf::Conductor(conductor(&mut plugin)?),
-        "roughconductor" => Bsdf::RoughConductor(rough_conductor(&mut plugin)?),
-        "dielectric" => Bsdf::Dielectric(dielectric(&mut plugin)?),
-        "twosided" => two_sided(&mut plugin)?,
-        _ => return Err(plugin.unknown(&KINDS)),
-    };
-    plugin.finish()?;
-    Ok(bsdf)
-}
-
 /// The model as it is on a surface whose normal points the other way.
 pub(super) fn turned(bsdf: Bsdf) -> Bsdf {
-    let black = Bsdf::Diffuse(Diffuse { reflectance: Spectrum::BLACK.into() });
     match bsdf {
-        Bsdf::Dielectric(glass) => Bsdf::Dielectric(Dielectric { eta: 1.0 / glass.eta, ..glass }),
         Bsdf::TwoSided(sides) => {
             let [front, back] = *sides;
             Bsdf::TwoSided(Box::new([back, front]))
         }
-        opaque @ (Bsdf::Diffuse(_) | Bsdf::Conductor(_) | Bsdf::RoughConductor(_)) => {
-            Bsdf::TwoSided(Box::new([black, opaque]))
-        }
+        one => Bsdf::Turned(Box::new(one)),
     }
 }
 
-/// A metal by its complex refractive index; one without η reflects everything, as does `material` none.
+/// Reads a scattering model.
+pub(super) fn read(element: Element<'_>) -> Result<Model, LoadError> {
+    let mut reader = Reader::default();
+    let bsdf = reader.read(element)?;
+    Ok(Model { bsdf, relief: reader.relief })
+}
+
+/// What has been met on the way through nested models.
+#[derive(Default)]
+struct Reader {
+    depth: usize,
+    relief: Option<Relief>,
+}
+
+impl Reader {
+    fn read(&mut self, element: Element<'_>) -> Result<Bsdf, LoadError> {
+        if self.depth > DEEPEST {
+            return Err(element.error(format!("bsdfs nested more than {DEEPEST} deep; do references run in a circle?")));
+        }
+        self.depth += 1;
+        let mut plugin = Plugin::new(element)?;
+        let bsdf = match plugin.kind {
+            "mask" => Bsdf::Mask(Mask {
+                opacity: plugin.number_texture("opacity", 0.5)?,
+                nested: Box::new(self.one(&mut plugin)?),
+            }),
+            "blendbsdf" => Bsdf::Blend(self.blend(&mut plugin)?),
+            "twosided" => self.two_sided(&mut plugin)?,
+            "bumpmap" | "normalmap" => self.relief(&mut plugin)?,
+            _ => plain(&mut plugin)?,
+        };
+        plugin.ignore(&FOREIGN);
+        plugin.finish()?;
+        self.depth -= 1;
+        Ok(bsdf)
+    }
+
+    /// The one nested model.
+    fn one(&mut self, plugin: &mut Plugin<'_>) -> Result<Bsdf, LoadError> {
+        let nested = plugin.objects("bsdf")?;
+        let [one] = nested[..] else {
+            let message = format!("a {} with {} nested <bsdf>; expected one", plugin.kind, nested.len());
+            return Err(plugin.element.error(message));
+        };
+        self.read(one)
+    }
+
+    fn blend(&mut self, plugin: &mut Plugin<'_>) -> Result<Blend, LoadError> {
+        if !plugin.is_given("weight") {
+            return Err(plugin.lacks("weight"));
+        }
+        let weight = plugin.number_texture("weight", 0.5)?;
+        let nested = plugin.objects("bsdf")?;
+        let [first, second] = nested[..] else {
+            let message = format!("a blendbsdf with {} nested <bsdf>; expected two", nested.len());
+            return Err(plugin.element.error(message));
+        };
+        Ok(Blend { weight, nested: Box::new([self.read(first)?, self.read(second)?]) })
+    }
+
+    fn two_sided(&mut self, plugin: &mut Plugin<'_>) -> Result<Bsdf, LoadError> {
+        let nested = plugin.objects("bsdf")?;
+        let mut side = |element: &Element<'_>| {
+            let kind = element.required("type")?;
+            // One in itself is refused before it is read, so that the message does not speak of circles.
+            let bsdf = if kind.text == "twosided" { None } else { Some(self.read(*element)?) };
+            let message = format!("a twosided bsdf cannot hold `{}`; expected an opaque bsdf", kind.text);
+            bsdf.filter(|bsdf| !bsdf.transmits()).ok_or_else(|| kind.error(message))
+        };
+        let sides = match &nested[..] {
+            [both] => {
+                let both = side(both)?;
+                [both.clone(), both]
+            }
+            [front, back] => [side(front)?, side(back)?],
+            _ => {
+                let message = format!("a twosided bsdf with {} nested <bsdf>; expected one or two", nested.len());
+                return Err(plugin.element.error(message));
+            }
+        };
+        Ok(Bsdf::TwoSided(Box::new(sides)))
+    }
+
+    /// The nested model of a bump or normal map, whose texture is kept aside.
+    fn relief(&mut self, plugin: &mut Plugin<'_>) -> Result<Bsdf, LoadError> {
+        if self.relief.is_some() {
+            return Err(plugin.element.error(format!("a {} inside of another relief; expected one", plugin.kind)));
+        }
+        let bump = plugin.kind == "bumpmap";
+        let name = if bump { "map" } else { "normalmap" };
+        let texture = match plugin.texture(name)? {
+            Some(texture) => Some(texture),
+            None => plugin.any_texture()?,
+        };
+        let texture = texture.ok_or_else(|| plugin.lacks(name))?;
+        self.relief = Some(if bump {
+            Relief::Bump { texture, scale: plugin.float("scale")?.map_or(1.0, |scale| scale.value) }
+        } else {
+            Relief::Normal { texture }
+        });
+        self.one(plugin)
+    }
+}
+
+/// Reads a model that holds no others.
+fn plain(plugin: &mut Plugin<'_>) -> Result<Bsdf, LoadError> {
+    Ok(match plugin.kind {
+        "diffuse" => Bsdf::Diffuse(Diffuse { reflectance: plugin.colour_texture("reflectance", GREY)? }),
+        "conductor" => {
+            plugin.ignore(&["alpha"]);
+            Bsdf::Conductor(conductor(plugin)?)
+        }
+        "roughconductor" => Bsdf::RoughConductor(RoughConductor {
+            metal: conductor(plugin)?,
+            roughness: microfacet::roughness(plugin)?,
+        }),
+        "dielectric" => {
+            plugin.ignore(&["alpha"]);
+            Bsdf::Dielectric(dielectric(plugin)?)
+        }
+        "thindielectric" => {
+            let Dielectric { eta, specular_reflectance, specular_transmittance } = dielectric(plugin)?;
+            Bsdf::ThinDielectric(ThinDielectric { eta, specular_reflectance, specular_transmittance })
+        }
+        "roughdielectric" => Bsdf::RoughDielectric(rough_dielectric(plugin)?),
+        "plastic" => Bsdf::Plastic(plastic(plugin)?),
+        "roughplastic" => Bsdf::RoughPlastic(Box::new(rough_plastic(plugin)?)),
+        "phong" => Bsdf::Phong(Phong {
+            exponent: plugin.number_texture("exponent", 30.0)?,
+            specular_reflectance: plugin.colour_texture("specular_reflectance", 0.2)?,
+            diffuse_reflectance: plugin.colour_texture("diffuse_reflectance", 0.5)?,
+        }),
+        "principled" => Bsdf::Principled(Box::new(principled::principled(plugin)?)),
+        "null" => Bsdf::Null,
+        _ => return Err(plugin.unknown(&KINDS)),
+    })
+}
+
+/// A metal by its name or its complex refractive index; one without η reflects everything, as does `material` none.
+/// `ext_eta` is the index of the medium outside, 1 where it is not given.
 fn conductor(plugin: &mut Plugin<'_>) -> Result<Conductor, LoadError> {
     let material = plugin.string("material")?;
     let valid = |colour: &Spectrum| colour.is_valid();
     let mut index = |name| plugin.colour(name)?.map(|c| c.check(valid, "values of at least 0")).transpose();
     let (eta, k) = (index("eta")?, index("k")?);
-    if let Some(material) = material.filter(|material| material.value.text != "none") {
-        return Err(material.refuse("none: measured metals come later; give `eta` and `k` instead"));
-    }
-    Ok(Conductor {
+    let index = match material.filter(|material| material.value.text != "none") {
+        Some(material) if eta.is_some() || k.is_some() => {
+            return Err(material.refuse("either `material` or `eta` and `k`"));
+        }
+        Some(material) => {
+            let known = metals::named(material.value.text);
+            Some(known.ok_or_else(|| material.refuse(&one_of(&metals::names())))?)
+        }
         // With η = 0 and any k, all light is reflected; k is 1 where it is not given.
-        index: eta.filter(|eta| !eta.is_black()).map(|eta| (eta, k.unwrap_or(Spectrum::ONE))),
-        specular_reflectance: plugin.share("specular_reflectance", 1.0)?,
+        None => eta.filter(|eta| !eta.is_black()).map(|eta| (eta, k.unwrap_or(Spectrum::ONE))),
+    };
+    let outside = ior::read(plugin, "ext_eta", 1.0)?;
+    Ok(Conductor {
+        index: index.map(|(eta, k)| (eta / outside, k / outside)),
+        specular_reflectance: plugin.colour_texture("specular_reflectance", 1.0)?,
     })
 }
 
-fn rough_conductor(plugin: &mut Plugin<'_>) -> Result<RoughConductor, LoadError> {
-    plugin.ignore(&["sample_visible"]);
-    let metal = conductor(plugin)?;
-    let distribution = match plugin.string("distribution")? {
-        None => Distribution::Beckmann,
-        Some(name) => match name.value.text {
-            "beckmann" => Distribution::Beckmann,
-            "ggx" => Distribution::Ggx,
-            _ => return Err(name.refuse("one of beckmann, ggx")),
-        },
-    };
-    let alpha = plugin.positive("alpha")?.unwrap_or(0.1);
-    Ok(RoughConductor { metal, microfacet: Microfacet { distribution, alpha } })
-}
-
 fn dielectric(plugin: &mut Plugin<'_>) -> Result<Dielectric, LoadError> {
-    let inside = ior::read(plugin, "int_ior", ior::BK7)?;
-    let outside = ior::read(plugin, "ext_ior", ior::AIR)?;
     Ok(Dielectric {
-        eta: inside / outside,
+        eta: relative_index(plugin, ior::BK7)?,
         specular_reflectance: plugin.share("specular_reflectance", 1.0)?,
         specular_transmittance: plugin.share("specular_transmittance", 1.0)?,
     })
 }
 
-fn two_sided(plugin: &mut Plugin<'_>) -> Result<Bsdf, LoadError> {
-    let nested = plugin.objects("bsdf")?;
-    let side = |element: &Element<'_>| {
-        // Refused before it is read, so that references cannot run in a circle.
-        if let Some(kind) = element.attribute("type").filter(|kind| ["twosided", "dielectric"].contains(&kind.text)) {
-            return Err(kind.error(format!("a twosided bsdf cannot hold `{}`; expected an opaque bsdf", kind.text)));
-        }
-        read(*element)
-    };
-    let sides = match &nested[..] {
-        [both] => [side(both)?, side(both)?],
-        [front, back] => [side(front)?, side(back)?],
-        _ => {
-            let message = format!("a twosided bsdf with {} nested <bsdf>; expected one or two", nested.len());
-            return Err(plugin.element.error(message));
-        }
-    };
-    Ok(Bsdf::TwoSided(Box::new(sides)))
+/// Refractive index inside over outside, of `inside` in air where it is not given.
+fn relative_index(plugin: &mut Plugin<'_>, inside: f64) -> Result<f64, LoadError> {
+    Ok(ior::read(plugin, "int_ior", inside)? / ior::read(plugin, "ext_ior", ior::AIR)?)
+}
+
+fn rough_dielectric(plugin: &mut Plugin<'_>) -> Result<RoughDielectric, LoadError> {
+    let Dielectric { eta, specular_reflectance, specular_transmittance } = dielectric(plugin)?;
+    if eta == 1.0 {
+        return Err(plugin.element.error("`int_ior` equals `ext_ior`; expected two indices that differ"));
+    }
+    let roughness = microfacet::roughness(plugin)?;
+    Ok(RoughDielectric { eta, roughness, specular_reflectance, specular_transmittance })
+}
+
+fn plastic(plugin: &mut Plugin<'_>) -> Result<Plastic, LoadError> {
+    let eta = relative_index(plugin, ior::POLYPROPYLENE)?;
+    let (diffuse, specular) = reflectances(plugin)?;
+    Ok(Plastic::new(eta, diffuse, specular, plugin.boolean("nonlinear")?))
+}
+
+fn rough_plastic(plugin: &mut Plugin<'_>) -> Result<RoughPlastic, LoadError> {
+    let eta = relative_index(plugin, ior::POLYPROPYLENE)?;
+    let (diffuse, specular) = reflectances(plugin)?;
+    let coat = microfacet::constant(plugin)?;
+    Ok(RoughPlastic::new(eta, coat, diffuse, specular, plugin.boolean("nonlinear")?))
+}
+
+/// Of the base and of the coat.
+fn reflectances(plugin: &mut Plugin<'_>) -> Result<(Colour, Colour), LoadError> {
+    let diffuse = plugin.colour_texture("diffuse_reflectance", 0.5)?;
+    Ok((diffuse, plugin.colour_texture("specular_reflectance", 1.0)?))
 }
 
 #[cfg(test)]
@@ -118,8 +280,8 @@ mod tests {
     #[test]
     fn turned_models_mirror() {
         let glass = Dielectric { eta: 1.5, specular_reflectance: Spectrum::ONE, specular_transmittance: Spectrum::ONE };
-        let mirror = Conductor { index: None, specular_reflectance: Spectrum::grey(0.9) };
-        let sides = Bsdf::TwoSided(Box::new([default(), Bsdf::Conductor(mirror)]));
+        let mirror = Conductor { index: None, specular_reflectance: Spectrum::grey(0.9).into() };
+        let sides = Bsdf::TwoSided(Box::new([default(), Bsdf::Conductor(mirror.clone())]));
         let mut stream = Stream::new(1, &[]);
         for bsdf in [default(), Bsdf::Conductor(mirror), Bsdf::Dielectric(glass), sides] {
             let other = turned(bsdf.clone());

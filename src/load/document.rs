@@ -2,6 +2,7 @@
 
 use super::error::{LoadError, one_of};
 use super::files::{At, Files};
+use super::picture::Pictures;
 use super::references;
 use super::source::Source;
 use super::value::Text;
@@ -26,13 +27,24 @@ pub(super) struct Document<'a> {
     ids: HashMap<String, (usize, Node<'a>)>,
     /// Fingerprints of what else was read: files with spectra.
     read: RefCell<Vec<blake3::Hash>>,
+    /// Images that its textures show.
+    pub pictures: Pictures,
+    /// What was read over in files of Mitsuba 0.5 and 0.6.
+    pub warnings: RefCell<Vec<String>>,
 }
 
 impl<'a> Document<'a> {
     /// The scene in `files`, of which `trees` has the trees in the same order.
     pub fn new(files: &'a Files, trees: &'a [Tree<'a>]) -> Result<Self, LoadError> {
-        let legacy = vec![false; trees.len()];
-        let mut document = Self { files, trees, legacy, ids: HashMap::new(), read: RefCell::default() };
+        let mut document = Self {
+            files,
+            trees,
+            legacy: vec![false; trees.len()],
+            ids: HashMap::new(),
+            read: RefCell::default(),
+            pictures: Pictures::default(),
+            warnings: RefCell::default(),
+        };
         document.versions()?;
         for (file, tree) in trees.iter().enumerate() {
             for node in tree.root_element().descendants().filter(Node::is_element) {

@@ -51,3 +51,6 @@ pub(super) const BK7: f64 = 1.5046;
 
 /// Index of the air that Mitsuba takes for the outside.
 pub(super) const AIR: f64 = 1.000277;
+
+/// Index of the plastic that Mitsuba takes for the inside.
+pub(super) const POLYPROPYLENE: f64 = 1.49;

@@ -6,8 +6,10 @@
 //!
 //! - `<include>`, `<path>`, `<default>`, `<alias>`, references;
 //! - shapes `rectangle`, `cube`, `sphere`, `disk`, `cylinder`, `obj`, `ply`, `serialized`, `shapegroup`, `instance`;
-//! - bsdfs `diffuse`, `conductor`, `roughconductor`, `dielectric`, `twosided`, nested or by reference;
-//! - emitters `area`, `constant`, `point`;
+//! - bsdfs `diffuse`, `conductor`, `roughconductor`, `dielectric`, `thindielectric`, `roughdielectric`, `plastic`,
+//!   `roughplastic`, `principled`, `phong`, `null`, `mask`, `blendbsdf`, `bumpmap`, `normalmap`, `twosided`;
+//! - textures `bitmap`, `checkerboard`;
+//! - emitters `area`, `constant`, `envmap`, `sunsky` (also `sun`, `sky`), `point`, `spot`, `directional`;
 //! - colours as `<rgb>`, `<spectrum>` of values, pairs or a file; in old files also `<srgb>` and `<blackbody>`;
 //! - sensors `perspective`, `thinlens` with an `hdrfilm`, its crop, and the filters `box`, `tent`, `gaussian`;
 //! - any integrator's `max_depth` and `hide_emitters`; samplers are read over.
@@ -15,12 +17,14 @@
 mod bsdf;
 mod cie;
 mod document;
+mod emitter;
 mod error;
 mod files;
 mod ior;
 mod legacy;
 mod mesh;
 mod obj;
+mod picture;
 mod plugin;
 mod ply;
 mod references;
@@ -30,14 +34,16 @@ mod serialized;
 mod shape;
 mod source;
 mod spectral;
+mod texture;
 mod transform;
 mod value;
 
+pub(crate) use error::one_of;
 pub use error::{LoadError, Place};
 
-use crate::bsdf::Bsdf;
 use crate::camera::Camera;
-use crate::scene::{BsdfId, Builder, FilmSpec, Scene, SceneError, Shine};
+use crate::scene::{BsdfId, Builder, FilmSpec, Scene, SceneError};
+use bsdf::Model;
 use document::{Document, Element};
 use files::{At, Files};
 use glam::DAffine3;
@@ -149,13 +155,15 @@ impl Reader {
             }
             // Models that no shape refers to are checked, and then left out.
             "bsdf" => bsdf::read(element).map(drop),
+            "texture" => texture::read(element).map(drop),
             "emitter" => {
-                let shine = shine(element)?;
-                self.builder.emitter(shine).map_err(|error| element.error(error.to_string()))
+                self.warnings.extend(emitter::caveat(element));
+                let add = |shine| self.builder.emitter(shine).map_err(|error| element.error(error.to_string()));
+                emitter::read(element)?.into_iter().try_for_each(add)
             }
             "shape" => self.shape(element),
-            // Textures are read where they are used. A sampler, film or filter out here has an id to be found by.
-            "texture" | "sampler" | "film" | "rfilter" => Ok(()),
+            // A sampler, film or filter out here has an id to be found by.
+            "sampler" | "film" | "rfilter" => Ok(()),
             // Other programs keep their settings in files of Mitsuba 0.5 and 0.6.
             other if element.is_legacy() && !UNSUPPORTED.contains(&other) => {
                 let message = format!("<{other}> is not an element of a scene and is read over");
@@ -203,8 +211,14 @@ impl Reader {
         if let Some(id) = self.bsdfs.get(&key) {
             return Ok(*id);
         }
-        let model: Bsdf = element.map_or(Ok(bsdf::default()), bsdf::read)?;
-        let id = self.builder.bsdf(if turned { bsdf::turned(model) } else { model });
+        let Model { bsdf, relief } = match element {
+            Some(element) => bsdf::read(element)?,
+            None => Model { bsdf: bsdf::default(), relief: None },
+        };
+        let id = self.builder.bsdf(if turned { bsdf::turned(bsdf) } else { bsdf });
+        if let Some(relief) = relief {
+            self.builder.relief(id, relief);
+        }
         self.bsdfs.insert(key, id);
         Ok(id)
     }
@@ -213,6 +227,8 @@ impl Reader {
         let (camera, film) = self.sensor.ok_or_else(|| root.error("this scene lacks a <sensor>"))?;
         self.builder.fingerprint(format!("{:?}", film.size).as_bytes());
         root.document.fingerprint(&mut self.builder);
+        root.document.pictures.fingerprint(&mut self.builder);
+        self.warnings.extend(root.document.warnings.take());
         let max_depth = self.max_depth.unwrap_or(UNBOUNDED_DEPTH);
         let scene = self.builder.build(camera, film, max_depth).map_err(|error| root.error(error.to_string()))?;
         if self.shapes == 0 {
@@ -241,33 +257,6 @@ fn integrator(element: Element<'_>) -> Result<(Option<usize>, bool), LoadError> 
     }
     plugin.ignore_rest();
     Ok((depth, hide_emitters))
-}
-
-/// Reads an emitter that is not a shape.
-fn shine(element: Element<'_>) -> Result<Shine, LoadError> {
-    let mut plugin = Plugin::new(element)?;
-    plugin.ignore(&["sampling_weight"]);
-    let shine = match plugin.kind {
-        "constant" => Shine::Environment(plugin.light("radiance")?),
-        "point" => {
-            let intensity = plugin.light("intensity")?;
-            let (to_world, transform) = plugin.placement()?;
-            let position = match plugin.point("position")? {
-                Some(_) if transform.tag() == "transform" => {
-                    return Err(transform.error("a point emitter with both `position` and `to_world`; expected one"));
-                }
-                Some(position) => position,
-                None => to_world.translation,
-            };
-            Shine::Point(position, intensity)
-        }
-        "area" => {
-            return Err(element.error("an area emitter shines from a shape; expected it inside of a <shape>"));
-        }
-        _ => return Err(plugin.unknown(&["constant", "point", "area (in a shape)"])),
-    };
-    plugin.finish()?;
-    Ok(shine)
 }
 
 /// Runs a parser that was written by others: should it panic, that is an error of the file.

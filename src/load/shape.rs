@@ -9,7 +9,7 @@ use super::source::read_bounded;
 use super::{obj, ply, serialized};
 use crate::geometry::Solid;
 use crate::scene::Mesh;
-use crate::spectrum::Spectrum;
+use crate::texture::Colour;
 use glam::{DAffine3, DVec3};
 
 const KINDS: [&str; 10] =
@@ -26,7 +26,7 @@ pub(super) struct Shape<'a> {
     /// Whether the model is seen from the other side: see [`round::Round::turned`].
     pub turned: bool,
     /// What it radiates.
-    pub radiance: Option<Spectrum>,
+    pub radiance: Option<Colour>,
     /// Bytes of the mesh file that it was read from.
     pub file: Option<Vec<u8>>,
 }
@@ -114,18 +114,24 @@ pub(super) fn read<'a>(element: Element<'a>, outer: &DAffine3) -> Result<Shape<'
         let message = format!("a {kind} that shines inwards is not supported; its normals must point outwards");
         return Err(element.error(message));
     }
+    if matches!((&form, &radiance), (Form::Solid(_), Some(Colour::Textured(_)))) {
+        return Err(element.error("a sphere or disk that shines by a texture is not supported; expected a mesh"));
+    }
     Ok(Shape { form, bsdf, turned, radiance, file })
 }
 
 /// Reads the emitter of a shape.
-fn area(element: Element<'_>) -> Result<Spectrum, LoadError> {
+fn area(element: Element<'_>) -> Result<Colour, LoadError> {
     let mut plugin = Plugin::new(element)?;
     if plugin.kind != "area" {
         let message = format!("unexpected emitter `{}` in a shape; expected area", plugin.kind);
         return Err(element.error(message));
     }
     plugin.ignore(&["sampling_weight"]);
-    let radiance = plugin.light("radiance")?;
+    let radiance = match plugin.texture("radiance")? {
+        Some(texture) => Colour::Textured(texture),
+        None => Colour::Constant(plugin.light("radiance")?),
+    };
     plugin.finish()?;
     Ok(radiance)
 }

@@ -41,17 +41,20 @@ fn see_light(scene: &Caster<'_>, camera: &[Vertex], heuristic: Heuristic) -> Opt
     let (id, start) = match &end.kind {
         VertexKind::Environment(id) => (*id, Start::Infinite { towards: -end.back }),
         VertexKind::Surface(surface) => {
-            (surface.emitter?, Start::Surface { position: end.position, normal: surface.geometric })
+            (surface.emitter?, Start::Surface { position: end.position, normal: surface.geometric, uv: surface.uv })
         }
         _ => return None,
     };
+    if scene.hide_emitters && camera.len() == 2 {
+        return None;
+    }
     let emitter = scene.emitter(id);
     let radiance = emitter.radiance(&start, end.back);
     if radiance.is_black() {
         return None;
     }
     let junction = Junction {
-        camera: scene.start_pdf(id).0,
+        camera: scene.start_pdf(id, &start).0,
         camera_previous: emitted_pdf(emitter, &start, previous, end.back, previous.position - end.position).0,
         ..Junction::default()
     };
@@ -150,7 +153,7 @@ fn join(
         return None;
     }
     let infinite = match &start.kind {
-        VertexKind::Light(_, Start::Infinite { towards }) => Some(*towards),
+        VertexKind::Light(_, Start::Infinite { towards } | Start::Distant { towards }) => Some(*towards),
         _ => None,
     };
     let offset = start.position - end.position;
@@ -204,7 +207,7 @@ fn reach_camera(
     let importance = scene.camera.direction_pdf(direction);
     let light_end = end_of(scene, light, -direction, Walk::FromLight)?;
     let value = start.throughput * light_end.value * (importance.0 / distance_squared);
-    if value.is_black() || !scene.visible(light_end.origin, lens) {
+    if value.is_black() || !scene.seen(light_end.origin, start.surface(), lens) {
         return None;
     }
     let normal = match &start.kind {

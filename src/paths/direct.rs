@@ -2,7 +2,7 @@
 
 use super::trace::light_offset;
 use crate::emitter::Start;
-use crate::math::{AreaPdf, Row, SolidAnglePdf};
+use crate::math::{Row, SolidAnglePdf};
 use crate::scene::{Caster, EmitterId, Origin};
 use crate::spectrum::Spectrum;
 use glam::DVec3;
@@ -38,11 +38,12 @@ pub fn sample_direct(scene: &Caster<'_>, position: DVec3, row: Row) -> Option<Di
     let emitter = scene.emitter(id);
     let (direction, target, pdf, weight) = match start {
         Start::Infinite { towards } => (towards, None, Some(SolidAnglePdf(pdf.0)), 1.0 / pdf.0),
+        Start::Distant { towards } => (towards, None, None, 1.0 / pdf.0),
         Start::Point { position: at } => {
             let offset = at - position;
             (offset.normalize(), Some(at), None, 1.0 / (pdf.0 * offset.length_squared()))
         }
-        Start::Surface { position: at, normal } => {
+        Start::Surface { position: at, normal, .. } => {
             let offset = at - position;
             let distance_squared = offset.length_squared();
             let direction = offset / distance_squared.sqrt();
@@ -54,13 +55,13 @@ pub fn sample_direct(scene: &Caster<'_>, position: DVec3, row: Row) -> Option<Di
     (!radiance.is_black()).then_some(Direct { direction, radiance, pdf, target })
 }
 
-/// Density with which [`sample_direct`] finds the point of the emitter `id` that a walk has hit along `direction`, at
-/// a surface with unit normal `normal` in distance `distance`; for an environment pass no surface.
+/// Density with which [`sample_direct`] finds `start` of the emitter `id`, which a walk has hit along `direction` after
+/// `distance`; for an environment the distance does not matter.
 #[inline]
-pub fn direct_pdf(scene: &Caster<'_>, id: EmitterId, hit: Option<(DVec3, f64)>, direction: DVec3) -> SolidAnglePdf {
-    let AreaPdf(pdf) = scene.start_pdf(id);
-    match hit {
-        Some((normal, distance)) => AreaPdf(pdf).to_solid_angle(normal.dot(direction), distance * distance),
-        None => SolidAnglePdf(pdf),
+pub fn direct_pdf(scene: &Caster<'_>, id: EmitterId, start: &Start, direction: DVec3, distance: f64) -> SolidAnglePdf {
+    let pdf = scene.start_pdf(id, start);
+    match start {
+        Start::Surface { normal, .. } => pdf.to_solid_angle(normal.dot(direction), distance * distance),
+        Start::Infinite { .. } | Start::Point { .. } | Start::Distant { .. } => SolidAnglePdf(pdf.0),
     }
 }

@@ -84,5 +84,5 @@ pub(super) fn weight(light: &[Vertex], camera: &[Vertex], junction: &Junction, h
 /// Whether a walk from the camera can meet the light that `vertex` lies on.
 #[inline]
 fn can_be_hit(vertex: &Vertex) -> bool {
-    !matches!(vertex.kind, VertexKind::Light(_, Start::Point { .. }))
+    !matches!(vertex.kind, VertexKind::Light(_, Start::Point { .. } | Start::Distant { .. }))
 }

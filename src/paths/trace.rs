@@ -77,7 +77,7 @@ pub fn light_vertex(scene: &Caster<'_>, row: Row) -> Option<Vertex> {
     let (id, start, pdf) = scene.sample_start(row)?;
     let position = match start {
         Start::Surface { position, .. } | Start::Point { position } => position,
-        Start::Infinite { .. } => DVec3::ZERO,
+        Start::Infinite { .. } | Start::Distant { .. } => DVec3::ZERO,
     };
     Some(Vertex {
         kind: VertexKind::Light(id, start),
@@ -123,7 +123,12 @@ fn walk(
     let mut alive = 1.0;
     while path.vertices.len() < vertices {
         let last = path.vertices.len() - 1;
-        let Some(surface) = scene.intersect(walker.origin, walker.direction) else {
+        let first = mode == Walk::FromCamera && last == 0;
+        let found = match first {
+            true => scene.see(walker.origin, walker.direction),
+            false => scene.intersect(walker.origin, walker.direction),
+        };
+        let Some(surface) = found else {
             if let (Walk::FromCamera, Some(id)) = (mode, scene.environment()) {
                 path.vertices.push(environment_vertex(id, &walker));
             }

@@ -3,11 +3,12 @@
 use super::{BsdfId, EmitterId, Face, Scene, Shape};
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
-use crate::emitter::{Area, Constant, Emitter, Surface};
+use crate::emitter::{Area, Backdrop, Constant, Directional, Emitter, Environment, Point, Reach, Spot, Surface};
 use crate::film::Filter;
 use crate::geometry::{Bvh, Solid, geometric_normal, offset};
 use crate::math::Discrete;
 use crate::spectrum::Spectrum;
+use crate::texture::{Colour, Relief};
 use glam::{DVec3, Vec2, Vec3};
 use thiserror::Error;
 
@@ -34,12 +35,35 @@ pub struct FilmSpec {
 }
 
 /// What an emitter of the scene is made from.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Shine {
     /// The same radiance from everywhere outside the scene.
     Environment(Spectrum),
+    /// An image around the scene, a sun, or both. A sun and an image may also come one after the other.
+    Backdrop(Backdrop),
     /// A point light: position, intensity.
     Point(DVec3, Spectrum),
+    /// A spot light.
+    Spot(Spot),
+    /// Parallel light: unit vector towards the source, irradiance.
+    Directional(DVec3, Spectrum),
+}
+
+/// What surrounds the scene.
+enum Surroundings {
+    Constant(Spectrum),
+    Backdrop(Backdrop),
+}
+
+impl Surroundings {
+    /// The emitter for a scene within `reach`, unless it is black.
+    fn emitter(self, reach: Reach) -> Option<Emitter> {
+        match self {
+            Self::Constant(radiance) if radiance.is_black() => None,
+            Self::Constant(radiance) => Some(Emitter::Constant(Constant { radiance, reach })),
+            Self::Backdrop(backdrop) => Environment::new(backdrop, reach).map(Emitter::Environment),
+        }
+    }
 }
 
 /// Why a scene cannot be built.
@@ -76,8 +100,10 @@ pub struct Builder {
     solid_shapes: Vec<u32>,
     shapes: Vec<Shape>,
     bsdfs: Vec<Bsdf>,
+    reliefs: Vec<Option<Relief>>,
     emitters: Vec<Emitter>,
-    environment: Option<Spectrum>,
+    surroundings: Option<Surroundings>,
+    parallel: Vec<(DVec3, Spectrum)>,
     hide_emitters: bool,
     hasher: blake3::Hasher,
 }
@@ -90,12 +116,18 @@ impl Builder {
 
     /// Adds a scattering model.
     pub fn bsdf(&mut self, bsdf: Bsdf) -> BsdfId {
+        self.reliefs.push(None);
         self.bsdfs.push(bsdf);
         BsdfId(self.bsdfs.len() as u32 - 1)
     }
 
+    /// Gives a relief to the surfaces of a model, to be called before these are added.
+    pub fn relief(&mut self, id: BsdfId, relief: Relief) {
+        self.reliefs[id.0 as usize] = Some(relief);
+    }
+
     /// Adds a mesh, which shines with `radiance` where one is given.
-    pub fn mesh(&mut self, mesh: Mesh, bsdf: BsdfId, radiance: Option<Spectrum>) -> Result<(), SceneError> {
+    pub fn mesh(&mut self, mesh: Mesh, bsdf: BsdfId, radiance: Option<Colour>) -> Result<(), SceneError> {
         if !mesh.positions.iter().chain(&mesh.normals).all(|v| v.is_finite()) {
             return Err(SceneError::NotFinite);
         }
@@ -107,7 +139,15 @@ impl Builder {
             let [a, b, c] = triangle.map(|i| mesh.positions[i as usize].as_dvec3());
             let normals = triangle.iter().filter_map(|i| mesh.normals.get(*i as usize));
             let towards = normals.sum::<Vec3>().as_dvec3();
-            if (b - a).cross(c - a).dot(towards) < 0.0 { [a, c, b] } else { [a, b, c] }
+            // Without texture coordinates, barycentric ones stand in, as in `Scene::triangle_surface`.
+            let [ua, ub, uc] = match mesh.uvs.is_empty() {
+                true => [Vec2::ZERO, Vec2::X, Vec2::Y],
+                false => triangle.map(|i| mesh.uvs.get(i as usize).copied().unwrap_or_default()),
+            };
+            match (b - a).cross(c - a).dot(towards) < 0.0 {
+                true => ([a, c, b], [ua, uc, ub]),
+                false => ([a, b, c], [ua, ub, uc]),
+            }
         };
         let surface = |()| Surface::triangles(mesh.triangles.iter().map(corners));
         let shape = self.shape(bsdf, radiance, !mesh.uvs.is_empty(), surface)?;
@@ -123,7 +163,7 @@ impl Builder {
     }
 
     /// Adds a sphere or a disk, which shines with `radiance` where one is given.
-    pub fn solid(&mut self, solid: Solid, bsdf: BsdfId, radiance: Option<Spectrum>) -> Result<(), SceneError> {
+    pub fn solid(&mut self, solid: Solid, bsdf: BsdfId, radiance: Option<Colour>) -> Result<(), SceneError> {
         let surface = |()| Some(Surface::Solid(solid)).filter(|surface| surface.area() > 0.0);
         let shape = self.shape(bsdf, radiance, true, surface)?;
         self.solids.push(solid);
@@ -134,33 +174,60 @@ impl Builder {
     fn shape(
         &mut self,
         bsdf: BsdfId,
-        radiance: Option<Spectrum>,
+        radiance: Option<Colour>,
         mapped: bool,
         surface: impl FnOnce(()) -> Option<Surface>,
     ) -> Result<u32, SceneError> {
-        let emitter = match radiance.filter(|radiance| !radiance.is_black()) {
+        let model = &self.bsdfs[bsdf.0 as usize];
+        let oriented = self.reliefs[bsdf.0 as usize].is_some() || !model.is_isotropic();
+        let mut textured = oriented || !model.is_constant();
+        let emitter = match radiance.filter(|radiance| *radiance != Colour::Constant(Spectrum::BLACK)) {
             Some(radiance) => {
                 let surface = surface(()).ok_or(SceneError::NoArea)?;
+                textured |= !radiance.is_constant();
                 self.emitters.push(Emitter::Area(Area::new(radiance, surface)));
                 Some(EmitterId(self.emitters.len() as u32 - 1))
             }
             None => None,
         };
-        let textured = !self.bsdfs[bsdf.0 as usize].is_constant();
-        self.shapes.push(Shape { bsdf, emitter, textured, mapped });
+        self.shapes.push(Shape { bsdf, emitter, textured, oriented, mapped });
         Ok(self.shapes.len() as u32 - 1)
     }
 
     /// Adds an emitter that is not a shape.
     pub fn emitter(&mut self, shine: Shine) -> Result<(), SceneError> {
         match shine {
-            Shine::Environment(_) if self.environment.is_some() => return Err(SceneError::TwoEnvironments),
-            Shine::Environment(radiance) => self.environment = Some(radiance),
-            Shine::Point(position, intensity) => {
-                self.emitters.push(Emitter::Point(crate::emitter::Point { position, intensity }));
-            }
+            Shine::Environment(radiance) => return self.surround(Surroundings::Constant(radiance)),
+            Shine::Backdrop(backdrop) => return self.surround(Surroundings::Backdrop(backdrop)),
+            Shine::Point(position, intensity) => self.emitters.push(Emitter::Point(Point { position, intensity })),
+            Shine::Spot(spot) => self.emitters.push(Emitter::Spot(spot)),
+            Shine::Directional(towards, irradiance) => self.parallel.push((towards, irradiance)),
         }
         Ok(())
+    }
+
+    /// Sets what surrounds the scene: once, but a sun and an image behind it may come as two.
+    fn surround(&mut self, new: Surroundings) -> Result<(), SceneError> {
+        self.surroundings = Some(match (self.surroundings.take(), new) {
+            (None, new) => new,
+            (Some(Surroundings::Backdrop(a)), Surroundings::Backdrop(b))
+                if !(a.image.is_some() && b.image.is_some() || a.sun.is_some() && b.sun.is_some()) =>
+            {
+                Surroundings::Backdrop(Backdrop { image: a.image.or(b.image), sun: a.sun.or(b.sun) })
+            }
+            _ => return Err(SceneError::TwoEnvironments),
+        });
+        Ok(())
+    }
+
+    /// Adds what surrounds a scene within `reach`, and says which emitter rays see that leave the scene.
+    fn far_emitters(&mut self, reach: Reach) -> Option<EmitterId> {
+        for (towards, irradiance) in std::mem::take(&mut self.parallel) {
+            self.emitters.push(Emitter::Directional(Directional { towards, irradiance, reach }));
+        }
+        let emitter = self.surroundings.take()?.emitter(reach)?;
+        self.emitters.push(emitter);
+        Some(EmitterId(self.emitters.len() as u32 - 1))
     }
 
     /// Whether the camera does not see lights themselves.
@@ -190,13 +257,10 @@ impl Builder {
     pub fn build(mut self, camera: Camera, film: FilmSpec, max_depth: usize) -> Result<Scene, SceneError> {
         let bvh = Bvh::build(&self.vertices, &self.triangles, &self.solids);
         let faces = self.triangles.iter().map(|triangle| self.face(triangle)).collect();
-        let environment = self.environment.filter(|radiance| !radiance.is_black()).map(|radiance| {
-            let (center, radius) = bvh.bounds().bounding_sphere();
-            // A margin for rounding; an empty scene has an environment too.
-            let radius = if radius > 0.0 { radius * (1.0 + 1e-6) } else { 1.0 };
-            self.emitters.push(Emitter::Constant(Constant { radiance, center, radius }));
-            EmitterId(self.emitters.len() as u32 - 1)
-        });
+        let (center, radius) = bvh.bounds().bounding_sphere();
+        // A margin for rounding; an empty scene has an environment too.
+        let radius = if radius > 0.0 { radius * (1.0 + 1e-6) } else { 1.0 };
+        let environment = self.far_emitters(Reach { center, radius });
         let powers: Vec<f64> = self.emitters.iter().map(Emitter::power).collect();
         Ok(Scene {
             camera,
@@ -214,6 +278,7 @@ impl Builder {
             solid_shapes: self.solid_shapes,
             shapes: self.shapes,
             bsdfs: self.bsdfs,
+            reliefs: self.reliefs,
             lights: Discrete::new(&powers),
             emitters: self.emitters,
             environment,

@@ -47,6 +47,37 @@ impl<'a> Caster<'a> {
         self.scene.intersect(&Ray::new(origin.point, direction), origin.triangle)
     }
 
+    /// The closest surface that the camera sees from `origin` along `direction`.
+    #[inline]
+    pub fn see(&self, origin: Origin, direction: DVec3) -> Option<Surface> {
+        let mut surface = self.intersect(origin, direction)?;
+        while self.scene.hide_emitters && surface.emitter.is_some() {
+            surface = self.intersect(surface.leave(direction), direction)?;
+        }
+        Some(surface)
+    }
+
+    /// Whether the camera sees the point that `from` starts at from its lens at `lens`; `surface` is what it lies on.
+    #[inline]
+    pub fn seen(&self, from: Origin, surface: Option<&Surface>, lens: DVec3) -> bool {
+        if !self.scene.hide_emitters {
+            return self.visible(from, lens);
+        }
+        if surface.is_none_or(|surface| surface.emitter.is_some()) {
+            return false;
+        }
+        let (mut at, distance) = (from, (lens - from.point).length());
+        let direction = (lens - from.point) / distance;
+        loop {
+            match self.intersect(at, direction) {
+                Some(hit) if (hit.position - from.point).length() >= distance => return true,
+                Some(hit) if hit.emitter.is_some() => at = hit.leave(direction),
+                Some(_) => return false,
+                None => return true,
+            }
+        }
+    }
+
     /// Whether nothing lies between two points, which the caller has moved off their surfaces. The ray ends short of the
     /// far point by 1e-10 of its length, since the rounding of a hit's distance grows with it.
     #[inline]

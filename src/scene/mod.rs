@@ -2,6 +2,7 @@
 
 mod builder;
 mod caster;
+mod relief;
 mod surface;
 
 pub use builder::{Builder, FilmSpec, Mesh, SceneError, Shine};
@@ -13,6 +14,7 @@ use crate::camera::Camera;
 use crate::emitter::{Emitter, Start};
 use crate::geometry::{Bvh, NO_TRIANGLE, Primitive, Ray, Solid, SurfacePoint};
 use crate::math::{AreaPdf, Discrete, Frame, Row};
+use crate::texture::Relief;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
 /// Index into the scene's scattering models.
@@ -30,6 +32,8 @@ struct Shape {
     emitter: Option<EmitterId>,
     /// Whether anything on it varies over the surface.
     textured: bool,
+    /// Whether its shading frames must follow the texture coordinates.
+    oriented: bool,
     /// Whether its vertices have texture coordinates.
     mapped: bool,
 }
@@ -53,7 +57,7 @@ pub struct Scene {
     pub film: FilmSpec,
     /// Longest path in edges that the scene file asks for.
     pub max_depth: usize,
-    /// Whether the scene file asks that the camera does not see lights themselves.
+    /// Whether the camera sees through surfaces that shine, and no environment: light shows by what it falls on only.
     pub hide_emitters: bool,
     /// Fingerprint of the scene: files, parameters, film size.
     pub hash: String,
@@ -69,6 +73,8 @@ pub struct Scene {
     solid_shapes: Vec<u32>,
     shapes: Vec<Shape>,
     bsdfs: Vec<Bsdf>,
+    /// By scattering model.
+    reliefs: Vec<Option<Relief>>,
     emitters: Vec<Emitter>,
     /// Choice of an emitter by its power; `None` when nothing shines.
     lights: Option<Discrete>,
@@ -98,26 +104,44 @@ impl Scene {
         } else {
             (normal, normal)
         };
-        let Shape { bsdf, emitter, textured, mapped } = self.shapes[self.triangle_shapes[index] as usize];
-        let uv = match (textured, mapped) {
-            (false, _) => DVec2::ZERO,
-            // As Mitsuba has it.
-            (true, false) => DVec2::new(u, v),
-            (true, true) => {
-                let [a, b, c] = corners.map(|i| self.uvs[i as usize].as_dvec2());
-                a * w + b * u + c * v
+        let Shape { bsdf, emitter, textured, oriented, mapped } = self.shapes[self.triangle_shapes[index] as usize];
+        let (mut uv, mut frame) = (DVec2::ZERO, Frame::around(shading));
+        if textured {
+            // Without texture coordinates, barycentric ones stand in, as in Mitsuba.
+            let uvs = match mapped {
+                true => corners.map(|i| self.uvs[i as usize].as_dvec2()),
+                false => [DVec2::ZERO, DVec2::X, DVec2::Y],
+            };
+            uv = uvs[0] * w + uvs[1] * u + uvs[2] * v;
+            if oriented {
+                frame = self.orient(shading, bsdf, uv, relief::derivatives([a, b, c], uvs, normal));
             }
-        };
-        let (position, frame, triangle) = (a * w + b * u + c * v, Frame::around(shading), index as u32);
+        }
+        let (position, triangle) = (a * w + b * u + c * v, index as u32);
         Surface { position, geometric, frame, uv, bsdf, emitter, offset, triangle }
+    }
+
+    /// The shading frame where it has to follow the texture coordinates.
+    fn orient(&self, normal: DVec3, bsdf: BsdfId, uv: DVec2, derivatives: [DVec3; 2]) -> Frame {
+        let frame = relief::oriented(normal, derivatives[0]);
+        match &self.reliefs[bsdf.0 as usize] {
+            Some(relief) => relief::tilted(frame, relief, uv, derivatives),
+            None => frame,
+        }
     }
 
     #[inline]
     fn solid_surface(&self, index: usize, near: DVec3) -> Surface {
         let SurfacePoint { position, normal, offset, .. } = self.solids[index].surface_point(near);
-        let Shape { bsdf, emitter, textured, .. } = self.shapes[self.solid_shapes[index] as usize];
-        let frame = Frame::around(normal);
-        let uv = if textured { self.solids[index].chart(position).uv } else { DVec2::ZERO };
+        let Shape { bsdf, emitter, textured, oriented, .. } = self.shapes[self.solid_shapes[index] as usize];
+        let (mut uv, mut frame) = (DVec2::ZERO, Frame::around(normal));
+        if textured {
+            let chart = self.solids[index].chart(position);
+            uv = chart.uv;
+            if oriented {
+                frame = self.orient(normal, bsdf, uv, chart.derivatives);
+            }
+        }
         Surface { position, geometric: normal, frame, uv, bsdf, emitter, offset, triangle: NO_TRIANGLE }
     }
 
@@ -163,10 +187,10 @@ impl Scene {
         Some((EmitterId(index as u32), start, AreaPdf(pdf.0 * lights.pdf(index))))
     }
 
-    /// Density of [`Scene::sample_start`] for any start on the emitter `id`.
+    /// Density with which [`Scene::sample_start`] finds `start` on the emitter `id`.
     #[inline]
-    pub fn start_pdf(&self, id: EmitterId) -> AreaPdf {
+    pub fn start_pdf(&self, id: EmitterId, start: &Start) -> AreaPdf {
         let choice = self.lights.as_ref().map_or(0.0, |lights| lights.pdf(id.0 as usize));
-        AreaPdf(self.emitter(id).start_pdf().0 * choice)
+        AreaPdf(self.emitter(id).start_pdf(start).0 * choice)
     }
 }

@@ -1,8 +1,12 @@
 //! Quantities that vary over a surface, by its texture coordinates.
 
+mod bitmap;
 mod checkerboard;
+mod picture;
 
+pub use bitmap::{Bitmap, Lookup, Wrap};
 pub use checkerboard::Checkerboard;
+pub use picture::{Picture, Texels};
 
 use crate::spectrum::Spectrum;
 use glam::DVec2;
@@ -13,6 +17,8 @@ use std::sync::Arc;
 pub enum Texture {
     /// Squares of two colours.
     Checkerboard(Checkerboard),
+    /// An image.
+    Bitmap(Bitmap),
 }
 
 impl Texture {
@@ -21,6 +27,15 @@ impl Texture {
     pub fn colour(&self, uv: DVec2) -> Spectrum {
         match self {
             Self::Checkerboard(checkerboard) => checkerboard.colour(uv),
+            Self::Bitmap(bitmap) => bitmap.colour(uv),
+        }
+    }
+
+    /// The mean colour of the texture plane, for choices that need one number; a clamped bitmap's is the image's.
+    pub fn mean(&self) -> Spectrum {
+        match self {
+            Self::Checkerboard(checkerboard) => (checkerboard.colours[0] + checkerboard.colours[1]) * 0.5,
+            Self::Bitmap(bitmap) => bitmap.mean(),
         }
     }
 }
@@ -44,6 +59,14 @@ impl Colour {
         }
     }
 
+    /// The mean over the texture plane.
+    pub fn mean(&self) -> Spectrum {
+        match self {
+            Self::Constant(colour) => *colour,
+            Self::Textured(texture) => texture.mean(),
+        }
+    }
+
     /// Whether it is the same everywhere.
     pub fn is_constant(&self) -> bool {
         matches!(self, Self::Constant(_))
@@ -54,6 +77,23 @@ impl From<Spectrum> for Colour {
     fn from(colour: Spectrum) -> Self {
         Self::Constant(colour)
     }
+}
+
+/// A texture that perturbs the shading frame.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Relief {
+    /// Heights, the luminance of a texture times `scale`.
+    Bump {
+        /// The heights.
+        texture: Arc<Texture>,
+        /// Factor on the heights.
+        scale: f64,
+    },
+    /// Normals in the shading frame, from −1 to 1 as 0 to 1.
+    Normal {
+        /// The normals.
+        texture: Arc<Texture>,
+    },
 }
 
 /// A number that may vary: the luminance of a texture.
@@ -72,6 +112,14 @@ impl Number {
         match self {
             Self::Constant(number) => *number,
             Self::Textured(texture) => texture.colour(uv).luminance(),
+        }
+    }
+
+    /// The mean over the texture plane.
+    pub fn mean(&self) -> f64 {
+        match self {
+            Self::Constant(number) => *number,
+            Self::Textured(texture) => texture.mean().luminance(),
         }
     }
 

@@ -1,6 +1,7 @@
 //! Maps from the unit square to the shapes that paths are sampled on; one file each, with sample, density and
 //! inverse side by side. `sample(invert(x)) = x`, and the density is the inverse of the map's Jacobian.
 
+pub mod cone;
 pub mod disk;
 pub mod hemisphere;
 pub mod sphere;
@@ -31,6 +32,8 @@ mod tests {
                 hemisphere::invert(hemisphere::sample(u)),
                 sphere::invert(sphere::sample(u)),
                 triangle::invert(triangle::sample(u)),
+                cone::invert(cone::sample(u, 0.3), 0.3),
+                cone::invert(cone::sample(u, 1e-5), 1e-5),
             ];
             for back in square_round_trips {
                 assert!((back[0] - u[0]).abs() < 1e-9 && (back[1] - u[1]).abs() < 1e-9, "{u:?} {back:?}");
@@ -43,6 +46,7 @@ mod tests {
                 (disk::PDF, density_by_differences(u, |u| disk::sample(u).extend(0.0))),
                 (hemisphere::pdf(hemisphere::sample(u)).0, density_by_differences(u, hemisphere::sample)),
                 (sphere::PDF.0, density_by_differences(u, sphere::sample)),
+                (cone::pdf(0.3).0, density_by_differences(u, |u| cone::sample(u, 0.3))),
                 (2.0, density_by_differences(u, |u| triangle::sample(u).extend(0.0))),
             ];
             for (pdf, by_differences) in checks {

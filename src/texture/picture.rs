@@ -1,0 +1,112 @@
+//! Pixels as they are stored: compactly, decoded by table when they are looked up.
+
+use crate::spectrum::Spectrum;
+use half::f16;
+use std::fmt;
+use std::sync::{LazyLock, OnceLock};
+
+/// Samples, row by row from the top, the channels of a pixel side by side.
+#[derive(Clone, PartialEq)]
+pub enum Texels {
+    /// 255ths, in the sRGB curve unless they are read raw.
+    Bytes(Vec<u8>),
+    /// 65535ths, in the sRGB curve unless they are read raw.
+    Shorts(Vec<u16>),
+    /// Linear, in half precision.
+    Halves(Vec<f16>),
+    /// Linear.
+    Floats(Vec<f32>),
+}
+
+impl Texels {
+    /// Linear samples, in half precision where this loses nothing.
+    pub fn linear(samples: Vec<f32>) -> Self {
+        if samples.iter().all(|sample| f16::from_f32(*sample).to_f32() == *sample) {
+            return Self::Halves(samples.into_iter().map(f16::from_f32).collect());
+        }
+        Self::Floats(samples)
+    }
+
+    fn len(&self) -> usize {
+        match self {
+            Self::Bytes(samples) => samples.len(),
+            Self::Shorts(samples) => samples.len(),
+            Self::Halves(samples) => samples.len(),
+            Self::Floats(samples) => samples.len(),
+        }
+    }
+}
+
+/// An image of one channel, which is grey, or of three.
+#[derive(Clone, PartialEq)]
+pub struct Picture {
+    size: [usize; 2],
+    channels: usize,
+    texels: Texels,
+    /// Mean colours, decoded and raw, once somebody has asked.
+    means: [OnceLock<Spectrum>; 2],
+}
+
+impl fmt::Debug for Picture {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Picture({}x{}, {} channels)", self.size[0], self.size[1], self.channels)
+    }
+}
+
+impl Picture {
+    /// A picture of width × height pixels; `None` where there are none, or not one or three samples for each.
+    pub fn new(size: [usize; 2], texels: Texels) -> Option<Self> {
+        let pixels = size[0].checked_mul(size[1]).filter(|pixels| *pixels > 0)?;
+        let channels = texels.len() / pixels;
+        let whole = [1, 3].contains(&channels) && texels.len() == channels * pixels;
+        whole.then(|| Self { size, channels, texels, means: Default::default() })
+    }
+
+    /// Width and height.
+    #[inline]
+    pub fn size(&self) -> [usize; 2] {
+        self.size
+    }
+
+    /// The colour of the pixel in column `x` and row `y`; samples in the sRGB curve are decoded unless `raw`.
+    #[inline]
+    pub fn pixel(&self, x: usize, y: usize, raw: bool) -> Spectrum {
+        let first = (y * self.size[0] + x) * self.channels;
+        if self.channels == 1 {
+            return Spectrum::grey(self.sample(first, raw));
+        }
+        Spectrum::rgb(self.sample(first, raw), self.sample(first + 1, raw), self.sample(first + 2, raw))
+    }
+
+    #[inline]
+    fn sample(&self, index: usize, raw: bool) -> f64 {
+        match &self.texels {
+            Texels::Bytes(samples) if raw => f64::from(samples[index]) / 255.0,
+            Texels::Bytes(samples) => BYTES[usize::from(samples[index])],
+            Texels::Shorts(samples) if raw => f64::from(samples[index]) / 65535.0,
+            Texels::Shorts(samples) => SHORTS[usize::from(samples[index])],
+            Texels::Halves(samples) => samples[index].to_f64(),
+            Texels::Floats(samples) => f64::from(samples[index]),
+        }
+    }
+
+    /// The mean of all pixels.
+    pub fn mean(&self, raw: bool) -> Spectrum {
+        *self.means[usize::from(raw)].get_or_init(|| {
+            let [width, height] = self.size;
+            let row = |y| (0..width).fold(Spectrum::BLACK, |sum, x| sum + self.pixel(x, y, raw));
+            (0..height).map(row).fold(Spectrum::BLACK, |sum, row| sum + row) / (width * height) as f64
+        })
+    }
+}
+
+/// Linear value of each byte in the sRGB curve.
+static BYTES: LazyLock<Vec<f64>> = LazyLock::new(|| (0..=255).map(|code| decode(f64::from(code) / 255.0)).collect());
+
+static SHORTS: LazyLock<Vec<f64>> =
+    LazyLock::new(|| (0..=65535).map(|code| decode(f64::from(code) / 65535.0)).collect());
+
+/// Linear value of an sRGB code value in [0, 1] (IEC 61966-2-1).
+fn decode(code: f64) -> f64 {
+    if code <= 0.04045 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) }
+}
