@@ -35,7 +35,7 @@ const BODIES: [(&str, &str); 68] = [
         r#"^<shape type="helix"/>"#,
         "unknown shape `helix`; expected one of rectangle, cube, sphere, disk, cylinder, obj, ply, serialized",
     ),
-    (r#"^<emitter type="envmap"/>"#, "unknown emitter `envmap`; expected one of constant, point, area (in a shape)"),
+    (r#"^<emitter type="laser"/>"#, "unknown emitter `laser`; expected one of "),
     (r#"^<emitter type="area"/>"#, "an area emitter shines from a shape"),
     (
         r#"<shape type="sphere">^<emitter type="point"/></shape>"#,
@@ -63,7 +63,7 @@ const BODIES: [(&str, &str); 68] = [
     ),
     (
         r#"<bsdf type="diffuse">^<texture type="bitmap" name="reflectance"/></bsdf>"#,
-        "`reflectance` is a <texture>; expected one of <rgb>, <spectrum>, <float>",
+        "texture `bitmap` lacks the parameter `filename`",
     ),
     (r#"<bsdf type="diffuse">^<rgb name="reflectance"/></bsdf>"#, "<rgb> lacks the attribute `value`"),
     (

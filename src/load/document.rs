@@ -6,6 +6,7 @@ use super::picture::Pictures;
 use super::references;
 use super::source::Source;
 use super::value::Text;
+use crate::scene::Builder;
 use std::cell::RefCell;
 use std::collections::HashMap;
 
@@ -24,6 +25,8 @@ pub(super) struct Document<'a> {
     /// Whether a file is in the format of Mitsuba 0.5 and 0.6.
     legacy: Vec<bool>,
     ids: HashMap<String, (usize, Node<'a>)>,
+    /// Fingerprints of what else was read: files with spectra.
+    read: RefCell<Vec<blake3::Hash>>,
     /// Images that its textures show.
     pub pictures: Pictures,
     /// What was read over in files of Mitsuba 0.5 and 0.6.
@@ -38,6 +41,7 @@ impl<'a> Document<'a> {
             trees,
             legacy: vec![false; trees.len()],
             ids: HashMap::new(),
+            read: RefCell::default(),
             pictures: Pictures::default(),
             warnings: RefCell::default(),
         };
@@ -118,6 +122,16 @@ impl<'a> Document<'a> {
             Some((file, node)) => Ok(Element { document: self, file: *file, node: *node }),
             None => Err(unknown(&id)),
         }
+    }
+
+    /// Notes that the image depends on these bytes of another file.
+    pub fn depends_on(&self, bytes: &[u8]) {
+        self.read.borrow_mut().push(blake3::hash(bytes));
+    }
+
+    /// Adds all such files to the scene's fingerprint.
+    pub fn fingerprint(&self, builder: &mut Builder) {
+        self.read.borrow().iter().for_each(|hash| builder.fingerprint(hash.as_bytes()));
     }
 
     /// All elements, file by file.

@@ -226,6 +226,7 @@ impl Reader {
     fn finish(mut self, root: Element<'_>) -> Result<Loaded, LoadError> {
         let (camera, film) = self.sensor.ok_or_else(|| root.error("this scene lacks a <sensor>"))?;
         self.builder.fingerprint(format!("{:?}", film.size).as_bytes());
+        root.document.fingerprint(&mut self.builder);
         root.document.pictures.fingerprint(&mut self.builder);
         self.warnings.extend(root.document.warnings.take());
         let max_depth = self.max_depth.unwrap_or(UNBOUNDED_DEPTH);

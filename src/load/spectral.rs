@@ -51,7 +51,7 @@ fn spectrum(element: Element<'_>, meaning: Meaning) -> Result<Spectrum, LoadErro
     let legacy = element.is_legacy();
     element.only(&["name", "value", "filename", "intent"][..if legacy { 4 } else { 3 }])?;
     if let Some(name) = element.attribute("filename") {
-        return Ok(colour(&file(name)?, meaning));
+        return Ok(colour(&file(element, name)?, meaning));
     }
     let text = element.required("value")?;
     if text.text.contains(':') {
@@ -80,12 +80,13 @@ fn pairs(text: Text<'_>) -> Result<Vec<[f64; 2]>, LoadError> {
 }
 
 /// The file that `name` means, with a wavelength and a value in each line.
-fn file(name: Text<'_>) -> Result<Vec<[f64; 2]>, LoadError> {
+fn file(element: Element<'_>, name: Text<'_>) -> Result<Vec<[f64; 2]>, LoadError> {
     let path = name.source.beside(name.text);
     let bytes = read_bounded(&path, MOST_BYTES).map_err(|reason| {
         let looked = name.source.looked(name.text);
         name.error(format!("cannot read the spectrum {}: {reason}{looked}", path.display()))
     })?;
+    element.document.depends_on(&bytes);
     let broken = |reason: String| name.error(format!("the spectrum {} is broken: {reason}", path.display()));
     let mut pairs = Vec::new();
     for (index, line) in String::from_utf8_lossy(&bytes).lines().enumerate() {
