@@ -29,7 +29,7 @@ const SEEN: DVec3 = DVec3::new(1.0, 0.0, 0.0);
 fn floor() -> Builder {
     let mut builder = Builder::new();
     let paint = builder.bsdf(Bsdf::Diffuse(Diffuse { reflectance: Spectrum::grey(REFLECTANCE).into() }));
-    builder.solid(Solid::Disk { center: DVec3::ZERO, normal: DVec3::Z, radius: 4.0 }, paint, None).unwrap();
+    builder.solid(Solid::disk(DVec3::ZERO, DVec3::Z, 4.0), paint, None).unwrap();
     builder
 }
 

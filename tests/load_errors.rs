@@ -35,7 +35,11 @@ const BODIES: [(&str, &str); 68] = [
         r#"^<shape type="helix"/>"#,
         "unknown shape `helix`; expected one of rectangle, cube, sphere, disk, cylinder, obj, ply, serialized",
     ),
-    (r#"^<emitter type="envmap"/>"#, "unknown emitter `envmap`; expected one of constant, point, area (in a shape)"),
+    (r#"^<emitter type="projector"/>"#, "unknown emitter `projector`; expected one of constant, envmap, sunsky"),
+    (r#"^<emitter type="envmap"/>"#, "emitter `envmap` lacks the parameter `filename`"),
+    (r#"<emitter type="spot"><float name="cutoff_angle" value="^0"/></emitter>"#, "expected above 0, up to 180"),
+    (r#"<emitter type="sky"><float name="turbidity" value="^11"/></emitter>"#, "expected 1 to 10"),
+    (r#"<emitter type="sky"/>^<emitter type="constant"/>"#, "a scene can have one environment emitter only"),
     (r#"^<emitter type="area"/>"#, "an area emitter shines from a shape"),
     (
         r#"<shape type="sphere">^<emitter type="point"/></shape>"#,

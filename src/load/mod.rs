@@ -151,6 +151,7 @@ impl Reader {
             }
             // Models that no shape refers to are checked, and then left out.
             "bsdf" => bsdf::read(element).map(drop),
+            "texture" => texture::read(element).map(drop),
             "emitter" => {
                 self.warnings.extend(emitter::caveat(element));
                 let add = |shine| self.builder.emitter(shine).map_err(|error| element.error(error.to_string()));
