@@ -29,7 +29,7 @@ const BODIES: [(&str, &str); 68] = [
     (
         r#"^<bsdf type="velvet"/>"#,
         "unknown bsdf `velvet`; expected one of diffuse, conductor, roughconductor, dielectric, thindielectric, roughdielectric, plastic, \
-         roughplastic, phong, null, mask, blendbsdf, twosided, bumpmap, normalmap",
+         roughplastic, phong, principled, null, mask, blendbsdf, twosided, bumpmap, normalmap",
     ),
     (
         r#"^<shape type="helix"/>"#,

@@ -9,7 +9,7 @@ use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_1_PI, TAU};
 
 /// Smallest roughness; smaller ones are raised to it, as in Mitsuba.
-const SMALLEST_ALPHA: f64 = 1e-4;
+pub(super) const SMALLEST_ALPHA: f64 = 1e-4;
 
 /// The family of distributions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

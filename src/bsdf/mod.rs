@@ -18,6 +18,7 @@ mod mask;
 mod microfacet;
 mod phong;
 mod plastic;
+mod principled;
 mod rough_coat;
 mod rough_conductor;
 mod rough_dielectric;
@@ -35,6 +36,7 @@ pub use mask::Mask;
 pub use microfacet::{Distribution, Microfacet, Roughness};
 pub use phong::Phong;
 pub use plastic::Plastic;
+pub use principled::Principled;
 pub use rough_coat::RoughCoat;
 pub use rough_conductor::RoughConductor;
 pub use rough_dielectric::RoughDielectric;
@@ -117,6 +119,8 @@ pub enum Bsdf {
     RoughPlastic(Box<RoughPlastic>),
     /// The modified Phong model on the side of the normal.
     Phong(Phong),
+    /// Burley's model.
+    Principled(Box<Principled>),
     /// A model with gaps.
     Mask(Mask),
     /// A mixture of two models.
@@ -151,6 +155,7 @@ impl Bsdf {
             Self::Plastic(plastic) => plastic.evaluate(uv, wi, wo),
             Self::RoughPlastic(plastic) => plastic.evaluate(uv, wi, wo),
             Self::Phong(phong) => phong.evaluate(uv, wi, wo),
+            Self::Principled(principled) => principled.evaluate(uv, wi, wo, walk),
             Self::Mask(mask) => mask.evaluate(uv, wi, wo, walk),
             Self::Blend(blend) => blend.evaluate(uv, wi, wo, walk),
             Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].evaluate(uv, wi, wo, walk),
@@ -177,6 +182,7 @@ impl Bsdf {
             Self::Plastic(plastic) => plastic.sample(uv, wi, row),
             Self::RoughPlastic(plastic) => plastic.sample(uv, wi, row),
             Self::Phong(phong) => phong.sample(uv, wi, row),
+            Self::Principled(principled) => principled.sample(uv, wi, row, walk),
             Self::Mask(mask) => mask.sample(uv, wi, row, walk),
             Self::Blend(blend) => blend.sample(uv, wi, row, walk),
             Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].sample(uv, wi, row, walk),
@@ -203,6 +209,7 @@ impl Bsdf {
             Self::Plastic(plastic) => plastic.invert(uv, wi, wo, delta, gamma),
             Self::RoughPlastic(plastic) => plastic.invert(uv, wi, wo, gamma),
             Self::Phong(phong) => phong.invert(uv, wi, wo, gamma),
+            Self::Principled(principled) => principled.invert(uv, wi, wo, gamma),
             Self::Mask(mask) => mask.invert(uv, wi, wo, delta, gamma),
             Self::Blend(blend) => blend.invert(uv, wi, wo, delta, gamma),
             Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].invert(uv, wi, wo, delta, gamma),

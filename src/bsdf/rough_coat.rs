@@ -1,6 +1,8 @@
 //! A rough dielectric boundary, and how much light it lets pass in total.
 
-use super::{Evaluation, Microfacet, fresnel};
+use super::microfacet::SMALLEST_ALPHA;
+use super::slopes::{Slopes, gaussian};
+use super::{Distribution, Evaluation, Microfacet, fresnel};
 use crate::math::SolidAnglePdf;
 use crate::spectrum::Spectrum;
 use glam::{DVec2, DVec3};
@@ -15,25 +17,29 @@ pub struct RoughCoat {
     pub eta: f64,
     /// The distribution of the facets.
     pub microfacet: Microfacet,
-    /// Share of light that is not reflected, by the cosine of incidence.
+    /// Share of light that is refracted and not shadowed, by the cosine of incidence.
     transmittance: Box<[f64]>,
 }
 
 impl RoughCoat {
-    /// Tabulates what passes.
-    pub fn new(eta: f64, microfacet: Microfacet) -> Self {
-        let passes = |i: usize| 1.0 - reflected(&microfacet, i as f64 / (ENTRIES - 1) as f64, eta);
+    /// Facets with roughness `alpha`; tabulates what passes.
+    pub fn new(eta: f64, (distribution, alpha, visible): (Distribution, f64, bool)) -> Self {
+        let microfacet = Microfacet { distribution, alpha: DVec2::splat(alpha.max(SMALLEST_ALPHA)), visible };
+        let rule = Rule::new(32);
+        let passes = |i: usize| rule.share(&microfacet, entry(i), |wi, h| refracted(&microfacet, wi, h, eta));
         Self { eta, microfacet, transmittance: (0..ENTRIES).map(passes).collect() }
     }
 
     /// Share of diffuse light from inside that is reflected back.
     pub fn internal_reflectance(&self) -> f64 {
-        let entry = |i: usize| i as f64 / (ENTRIES - 1) as f64;
-        let sum: f64 = (0..ENTRIES).map(|i| reflected(&self.microfacet, entry(i), 1.0 / self.eta) * entry(i)).sum();
-        2.0 * sum / ENTRIES as f64
+        // Total reflection has an edge, which takes more nodes.
+        let rule = Rule::new(128);
+        let back = |wi: DVec3, h: DVec3| reflected(&self.microfacet, wi, h, 1.0 / self.eta);
+        let share = |i: usize| rule.share(&self.microfacet, entry(i), back) * entry(i);
+        2.0 * (0..ENTRIES).map(share).sum::<f64>() / ENTRIES as f64
     }
 
-    /// Share of the light at the positive cosine `cos` that is not reflected.
+    /// Share of the light at the positive cosine `cos` that passes.
     #[inline]
     pub(super) fn transmittance(&self, cos: f64) -> f64 {
         let position = cos.clamp(0.0, 1.0) * (ENTRIES - 1) as f64;
@@ -69,22 +75,65 @@ impl RoughCoat {
     }
 }
 
-/// Share of light at the cosine `cos` that facets reflect and do not shadow, by the visible normals at the nodes of a
-/// product of Gauss-Legendre rules.
-fn reflected(microfacet: &Microfacet, cos: f64, eta: f64) -> f64 {
-    let visible = Microfacet { visible: true, ..*microfacet };
-    let cos = cos.max(1e-6);
-    let wi = DVec3::new((1.0 - cos * cos).max(0.0).sqrt(), 0.0, cos);
-    // Total reflection has an edge, which takes more nodes.
-    let rule = gauss_legendre(if eta > 1.0 { 32 } else { 128 });
-    let at = |u: DVec2| {
-        let h = visible.sample(wi, u.to_array());
-        let cos = wi.dot(h);
-        let wo = h * (2.0 * cos) - wi;
-        if wo.z <= 0.0 || cos <= 0.0 { 0.0 } else { visible.shadowing(wo, h) * fresnel::dielectric(cos, eta).0 }
-    };
-    let along = |x: f64| rule.iter().map(|(y, weight)| weight * at(DVec2::new(x, *y))).sum::<f64>();
-    rule.iter().map(|(x, weight)| weight * along(*x)).sum()
+/// Cosine of an entry of the table.
+fn entry(i: usize) -> f64 {
+    i as f64 / (ENTRIES - 1) as f64
+}
+
+/// Share that the facet `h` reflects of light from `wi`, and that is not shadowed.
+fn reflected(microfacet: &Microfacet, wi: DVec3, h: DVec3, eta: f64) -> f64 {
+    let cos = wi.dot(h);
+    let wo = h * (2.0 * cos) - wi;
+    if wo.z <= 0.0 || cos <= 0.0 { 0.0 } else { microfacet.shadowing(wo, h) * fresnel::dielectric(cos, eta).0 }
+}
+
+/// Share that it refracts.
+fn refracted(microfacet: &Microfacet, wi: DVec3, h: DVec3, eta: f64) -> f64 {
+    let cos = wi.dot(h);
+    match fresnel::dielectric(cos, eta) {
+        (reflectance, Some(cos_t)) if cos > 0.0 => {
+            let wo = h * (cos / eta - cos_t) - wi / eta;
+            if wo.z < 0.0 { microfacet.shadowing(wo, h) * (1.0 - reflectance) } else { 0.0 }
+        }
+        _ => 0.0,
+    }
+}
+
+/// A rule of Gauss and Legendre on the unit square.
+struct Rule {
+    /// Nodes and weights of one axis.
+    nodes: Vec<(f64, f64)>,
+    /// Slopes of a Beckmann surface across the plane of incidence, and weights, for the first half of the nodes: the
+    /// facets on both sides of that plane do the same.
+    across: Vec<(f64, f64)>,
+}
+
+impl Rule {
+    fn new(n: usize) -> Self {
+        let nodes = gauss_legendre(n);
+        let across = nodes[..n / 2].iter().map(|(v, weight)| (gaussian(*v), 2.0 * weight)).collect();
+        Self { nodes, across }
+    }
+
+    /// Mean over the facets that are seen at the cosine `cos`.
+    fn share(&self, microfacet: &Microfacet, cos: f64, of: impl Fn(DVec3, DVec3) -> f64) -> f64 {
+        let visible = Microfacet { visible: true, ..*microfacet };
+        let (cos, alpha) = (cos.max(1e-6), microfacet.alpha.x);
+        let wi = DVec3::new((1.0 - cos * cos).max(0.0).sqrt(), 0.0, cos);
+        let slopes = Slopes::of(DVec3::new(alpha * wi.x, 0.0, wi.z));
+        let inner = |u: f64| match visible.distribution {
+            Distribution::Ggx => {
+                let half = self.nodes[..self.across.len()].iter();
+                half.map(|(v, weight)| 2.0 * weight * of(wi, visible.sample(wi, [*v, u]))).sum::<f64>()
+            }
+            Distribution::Beckmann => {
+                let x = slopes.along(u);
+                let normal = |y: f64| DVec3::new(-alpha * x, -alpha * y, 1.0).normalize();
+                self.across.iter().map(|(y, weight)| weight * of(wi, normal(*y))).sum()
+            }
+        };
+        self.nodes.iter().map(|(u, weight)| weight * inner(*u)).sum()
+    }
 }
 
 /// Nodes and weights on 0 to 1, by Newton's method on the Legendre polynomial.

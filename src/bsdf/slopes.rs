@@ -49,7 +49,12 @@ impl Slopes {
 
     /// Slopes along the two tangents.
     pub fn sample(&self, u: [f64; 2]) -> DVec2 {
-        let target = u[0] * self.area();
+        self.towards * self.along(u[0]) + self.towards.perp() * gaussian(u[1])
+    }
+
+    /// Slope in the plane of the direction.
+    pub fn along(&self, u: f64) -> f64 {
+        let target = u * self.area();
         let (mut low, mut high) = (-STEEPEST, self.steepest());
         let mut x = 0f64.clamp(low, high);
         for _ in 0..STEPS {
@@ -69,7 +74,7 @@ impl Slopes {
                 break;
             }
         }
-        self.towards * x + self.towards.perp() * gaussian(u[1])
+        x
     }
 
     /// The inverse of [`Slopes::sample`].
@@ -81,7 +86,7 @@ impl Slopes {
 
 /// The x at which (1 + erf x) / 2 = `u`: a start by Giles 2010, *Approximating the erfinv function*, whose seven digits
 /// hold up to tails of 10⁻⁷, and Halley's method from there.
-fn gaussian(u: f64) -> f64 {
+pub(super) fn gaussian(u: f64) -> f64 {
     let u = u.clamp(f64::EPSILON * 0.25, 1.0 - f64::EPSILON * 0.5);
     let w = -(4.0 * u * (1.0 - u)).ln();
     let (t, terms) = if w < 5.0 { (w - 2.5, &CENTRE) } else { (w.min(16.0).sqrt() - 3.0, &TAIL) };

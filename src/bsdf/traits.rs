@@ -14,7 +14,8 @@ impl Bsdf {
             | Self::RoughDielectric(_)
             | Self::Plastic(_)
             | Self::RoughPlastic(_)
-            | Self::Phong(_) => false,
+            | Self::Phong(_)
+            | Self::Principled(_) => false,
             Self::Mask(mask) => mask.nested.is_delta(wi),
             Self::Blend(blend) => blend.nested.iter().all(|nested| nested.is_delta(wi)),
             Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].is_delta(wi),
@@ -33,7 +34,8 @@ impl Bsdf {
             | Self::RoughConductor(_)
             | Self::RoughDielectric(_)
             | Self::RoughPlastic(_)
-            | Self::Phong(_) => false,
+            | Self::Phong(_)
+            | Self::Principled(_) => false,
             Self::Blend(blend) => blend.nested.iter().any(|nested| nested.has_delta(wi)),
             Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].has_delta(wi),
             Self::TwoSided(sides) => sides[1].has_delta(flip(wi)),
@@ -49,6 +51,7 @@ impl Bsdf {
             Self::RoughConductor(rough) => rough.roughness.gathers(),
             Self::RoughDielectric(rough) => rough.roughness.gathers(),
             Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) | Self::Null => false,
+            Self::Principled(principled) => principled.gathers(),
             Self::Mask(mask) => mask.nested.gathers(wi),
             Self::Blend(blend) => blend.nested.iter().any(|nested| nested.gathers(wi)),
             Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].gathers(wi),
@@ -70,6 +73,7 @@ impl Bsdf {
             | Self::RoughPlastic(_)
             | Self::Phong(_)
             | Self::TwoSided(_) => false,
+            Self::Principled(principled) => principled.transmits(),
             Self::Blend(blend) => blend.nested.iter().any(Self::transmits),
             Self::Turned(bsdf) => bsdf.transmits(),
         }
@@ -116,6 +120,7 @@ impl Bsdf {
                     && phong.diffuse_reflectance.is_constant()
                     && phong.exponent.is_constant()
             }
+            Self::Principled(principled) => principled.is_constant(),
             Self::Mask(mask) => mask.opacity.is_constant() && mask.nested.is_constant(),
             Self::Blend(blend) => blend.weight.is_constant() && blend.nested.iter().all(Self::is_constant),
             Self::TwoSided(sides) => sides.iter().all(Self::is_constant),

@@ -3,6 +3,7 @@
 
 mod metals;
 mod microfacet;
+mod principled;
 
 use super::document::Element;
 use super::error::{LoadError, one_of};
@@ -15,7 +16,7 @@ use crate::bsdf::{
 use crate::spectrum::Spectrum;
 use crate::texture::{Colour, Relief};
 
-const KINDS: [&str; 15] = [
+const KINDS: [&str; 16] = [
     "diffuse",
     "conductor",
     "roughconductor",
@@ -25,6 +26,7 @@ const KINDS: [&str; 15] = [
     "plastic",
     "roughplastic",
     "phong",
+    "principled",
     "null",
     "mask",
     "blendbsdf",
@@ -112,7 +114,7 @@ impl Reader {
     }
 
     fn blend(&mut self, plugin: &mut Plugin<'_>) -> Result<Blend, LoadError> {
-        if !given(plugin, "weight") {
+        if !plugin.is_given("weight") {
             return Err(plugin.lacks("weight"));
         }
         let weight = plugin.number_texture("weight", 0.5)?;
@@ -196,6 +198,7 @@ fn plain(plugin: &mut Plugin<'_>) -> Result<Bsdf, LoadError> {
             specular_reflectance: plugin.colour_texture("specular_reflectance", 0.2)?,
             diffuse_reflectance: plugin.colour_texture("diffuse_reflectance", 0.5)?,
         }),
+        "principled" => Bsdf::Principled(Box::new(principled::principled(plugin)?)),
         "null" => Bsdf::Null,
         _ => return Err(plugin.unknown(&KINDS)),
     })
@@ -265,11 +268,6 @@ fn rough_plastic(plugin: &mut Plugin<'_>) -> Result<RoughPlastic, LoadError> {
 fn reflectances(plugin: &mut Plugin<'_>) -> Result<(Colour, Colour), LoadError> {
     let diffuse = plugin.colour_texture("diffuse_reflectance", 0.5)?;
     Ok((diffuse, plugin.colour_texture("specular_reflectance", 1.0)?))
-}
-
-/// Whether the parameter `name` stands in the file.
-fn given(plugin: &Plugin<'_>, name: &str) -> bool {
-    plugin.element.children().any(|child| child.attribute("name").is_some_and(|text| text.text == name))
 }
 
 #[cfg(test)]

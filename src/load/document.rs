@@ -6,6 +6,7 @@ use super::picture::Pictures;
 use super::references;
 use super::source::Source;
 use super::value::Text;
+use std::cell::RefCell;
 use std::collections::HashMap;
 
 pub(super) type Node<'a> = roxmltree::Node<'a, 'a>;
@@ -25,13 +26,21 @@ pub(super) struct Document<'a> {
     ids: HashMap<String, (usize, Node<'a>)>,
     /// Images that its textures show.
     pub pictures: Pictures,
+    /// What was read over in files of Mitsuba 0.5 and 0.6.
+    pub warnings: RefCell<Vec<String>>,
 }
 
 impl<'a> Document<'a> {
     /// The scene in `files`, of which `trees` has the trees in the same order.
     pub fn new(files: &'a Files, trees: &'a [Tree<'a>]) -> Result<Self, LoadError> {
-        let mut document =
-            Self { files, trees, legacy: vec![false; trees.len()], ids: HashMap::new(), pictures: Pictures::default() };
+        let mut document = Self {
+            files,
+            trees,
+            legacy: vec![false; trees.len()],
+            ids: HashMap::new(),
+            pictures: Pictures::default(),
+            warnings: RefCell::default(),
+        };
         document.versions()?;
         for (file, tree) in trees.iter().enumerate() {
             for node in tree.root_element().descendants().filter(Node::is_element) {

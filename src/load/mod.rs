@@ -223,6 +223,7 @@ impl Reader {
         let (camera, film) = self.sensor.ok_or_else(|| root.error("this scene lacks a <sensor>"))?;
         self.builder.fingerprint(format!("{:?}", film.size).as_bytes());
         root.document.pictures.fingerprint(&mut self.builder);
+        self.warnings.extend(root.document.warnings.take());
         let max_depth = self.max_depth.unwrap_or(UNBOUNDED_DEPTH);
         let scene = self.builder.build(camera, film, max_depth).map_err(|error| root.error(error.to_string()))?;
         if self.shapes == 0 {

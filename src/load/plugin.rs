@@ -92,6 +92,11 @@ impl<'a> Plugin<'a> {
         self.element.error(format!("{} `{}` lacks the parameter `{name}`", self.element.tag(), self.kind))
     }
 
+    /// Whether the parameter `name` is there.
+    pub fn is_given(&self, name: &str) -> bool {
+        self.children.iter().any(|child| child.is_named(name))
+    }
+
     /// Whether the parameter `name` is there and is one of `tags`; a reference is `ref` or what it refers to.
     pub fn has(&self, name: &str, tags: &[&str]) -> bool {
         let mut named = self.children.iter().filter(|child| child.is_named(name));
@@ -263,7 +268,18 @@ impl<'a> Plugin<'a> {
     }
 
     /// Refuses what nobody asked for.
-    pub fn finish(self) -> Result<(), LoadError> {
+    pub fn finish(mut self) -> Result<(), LoadError> {
+        if self.element.is_legacy() {
+            // Mitsuba 0.6 warned of parameters that it did not know.
+            const SCALARS: [&str; 4] = ["boolean", "integer", "float", "string"];
+            let (odd, rest) = self.children.into_iter().partition(|child| SCALARS.contains(&child.element.tag()));
+            let odd: Vec<Child<'_>> = odd;
+            let warn = |child: Child<'_>| {
+                child.element.warning(format!("{} `{}` has no such parameter", self.element.tag(), self.kind))
+            };
+            self.element.document.warnings.borrow_mut().extend(odd.into_iter().map(warn));
+            self.children = rest;
+        }
         let Some(Child { element: child, .. }) = self.children.first() else {
             return Ok(());
         };

@@ -10,6 +10,7 @@ import random
 import mitsuba as mi
 
 mi.set_variant("scalar_rgb")
+mi.set_log_level(mi.LogLevel.Error)
 PAIRS = 6
 
 

@@ -91,6 +91,27 @@ fn pane() -> Bsdf {
     Bsdf::ThinDielectric(ThinDielectric { eta: 1.5, specular_reflectance: one, specular_transmittance: one })
 }
 
+/// Burley's model with roughness, metallic, spec_trans, anisotropic, and strengths of tint, sheen, flatness and coat.
+fn principled(
+    [roughness, metallic, spec_trans, anisotropic]: [f64; 4],
+    [tint, sheen, flatness, coat]: [f64; 4],
+) -> Bsdf {
+    Bsdf::Principled(Box::new(Principled {
+        base_color: colour(0.5, 0.3, 0.1),
+        roughness: roughness.into(),
+        anisotropic: anisotropic.into(),
+        metallic: metallic.into(),
+        spec_trans: spec_trans.into(),
+        spec_tint: tint.into(),
+        sheen: sheen.into(),
+        sheen_tint: tint.into(),
+        flatness: flatness.into(),
+        clearcoat: coat.into(),
+        clearcoat_gloss: 0.2.into(),
+        eta: 1.5,
+    }))
+}
+
 /// Sweeps of distributions, roughnesses and indices.
 fn microfacets() -> Vec<Case> {
     let mut cases = Vec::new();
@@ -146,6 +167,12 @@ pub fn cases() -> Vec<Case> {
         case("blend of mirror, diffuse", blend(0.5, mirror(), diffuse())),
         lossless("blend of glass, null", blend(0.5, glass(1.5), Bsdf::Null)),
         mixture("blend of a blend", blend(0.5, blend(0.2, diffuse(), phong(20.0)), mask(0.5, brushed()))),
+        mixture("principled", principled([0.5, 0.0, 0.0, 0.0], [0.0; 4])),
+        mixture("principled metal", principled([0.4, 1.0, 0.0, 0.7], [0.0; 4])),
+        mixture("principled glass", principled([0.5, 0.0, 1.0, 0.0], [0.0; 4])),
+        mixture("principled cloth", principled([0.7, 0.0, 0.0, 0.0], [0.5, 0.5, 0.5, 0.0])),
+        mixture("principled coat", principled([0.6, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0])),
+        mixture("principled all", principled([0.4, 0.3, 0.5, 0.5], [0.5, 0.2, 0.5, 0.5])),
         mixture("two-sided", Bsdf::TwoSided(Box::new([phong(20.0), brushed()]))),
         case("two-sided plastic", Bsdf::TwoSided(Box::new([plastic(1.5, true), plastic(1.2, false)]))),
         case("turned plastic", Bsdf::Turned(Box::new(plastic(1.5, true)))),

@@ -1,6 +1,5 @@
 //! Parameters of microfacet distributions.
 
-use super::given;
 use crate::bsdf::{Distribution, Roughness};
 use crate::load::document::Element;
 use crate::load::error::LoadError;
@@ -14,8 +13,8 @@ const ALPHA: f64 = 0.1;
 pub(super) fn roughness(plugin: &mut Plugin<'_>) -> Result<Roughness, LoadError> {
     let distribution = distribution(plugin)?;
     let visible = visible(plugin)?;
-    let (alpha_u, alpha_v) = if given(plugin, "alpha_u") || given(plugin, "alpha_v") {
-        if given(plugin, "alpha") {
+    let (alpha_u, alpha_v) = if plugin.is_given("alpha_u") || plugin.is_given("alpha_v") {
+        if plugin.is_given("alpha") {
             return Err(plugin.element.error("both `alpha` and `alpha_u`, `alpha_v`; expected one or the other"));
         }
         (alpha(plugin, "alpha_u")?, alpha(plugin, "alpha_v")?)
@@ -44,7 +43,7 @@ fn distribution(plugin: &mut Plugin<'_>) -> Result<Distribution, LoadError> {
 
 /// Whether only visible normals are sampled, as is the default.
 fn visible(plugin: &mut Plugin<'_>) -> Result<bool, LoadError> {
-    let named = given(plugin, "sample_visible");
+    let named = plugin.is_given("sample_visible");
     Ok(plugin.boolean("sample_visible")? || !named)
 }
 
