@@ -10,6 +10,7 @@ pub mod film;
 pub mod forest;
 pub mod geometry;
 pub mod image;
+pub mod import;
 pub mod integrators;
 pub mod load;
 pub mod markov;

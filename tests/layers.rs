@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 /// The rooms, lowest first. Rooms on one line may use each other's types only downwards in the order given.
-const ROOMS: [&str; 18] = [
+const ROOMS: [&str; 19] = [
     "math",
     "spectrum",
     "forest",
@@ -19,6 +19,7 @@ const ROOMS: [&str; 18] = [
     "film",
     "scene",
     "load",
+    "import",
     "paths",
     "markov",
     "integrators",

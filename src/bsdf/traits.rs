@@ -1,6 +1,7 @@
 //! What integrators ask of a model before they look at directions.
 
 use super::{Bsdf, flip};
+use crate::texture::Number;
 use glam::DVec3;
 
 impl Bsdf {
@@ -84,6 +85,7 @@ impl Bsdf {
         match self {
             Self::RoughConductor(rough) => rough.roughness.is_isotropic(),
             Self::RoughDielectric(rough) => rough.roughness.is_isotropic(),
+            Self::Principled(principled) => matches!(principled.anisotropic, Number::Constant(0.0)),
             Self::Mask(mask) => mask.nested.is_isotropic(),
             Self::Blend(blend) => blend.nested.iter().all(Self::is_isotropic),
             Self::TwoSided(sides) => sides.iter().all(Self::is_isotropic),

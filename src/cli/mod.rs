@@ -3,6 +3,7 @@
 mod auto;
 mod blend;
 mod compare;
+mod import;
 mod progress;
 mod render;
 mod train;
@@ -39,6 +40,9 @@ enum Verb {
     /// Render a scene with two methods for half the time each and blend them with the built-in model.
     #[command(after_help = "Example: pathblend auto scenes/spheres/scene.xml --time 60s -o spheres.exr")]
     Auto(auto::Auto),
+    /// Convert a scene of pbrt to Mitsuba 3 XML.
+    #[command(after_help = "Example: pathblend import pbrt/scene.pbrt -o scene.xml")]
+    Import(import::Import),
 }
 
 /// Runs the verb that the user asked for.
@@ -52,6 +56,7 @@ pub fn run(arguments: Arguments) -> anyhow::Result<()> {
         Verb::Train(train) => train.run(),
         Verb::Blend(blend) => blend.run(),
         Verb::Auto(auto) => auto.run(),
+        Verb::Import(import) => import.run(),
     }
 }
 

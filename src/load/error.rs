@@ -36,7 +36,7 @@ pub struct Place {
 
 impl LoadError {
     /// An error that concerns the whole file.
-    pub(super) fn whole(file: &Path, message: impl Into<String>) -> Self {
+    pub(crate) fn whole(file: &Path, message: impl Into<String>) -> Self {
         Self { file: file.to_owned(), place: None, message: printable(&message.into()) }
     }
 
@@ -57,7 +57,7 @@ impl LoadError {
 
 impl Place {
     /// The place at the byte `offset` of `text`.
-    pub(super) fn at(text: &str, offset: usize) -> Self {
+    pub(crate) fn at(text: &str, offset: usize) -> Self {
         let before = text.get(..offset).unwrap_or(text);
         let start = before.rfind('\n').map_or(0, |newline| newline + 1);
         let line = text.get(start..).and_then(|rest| rest.lines().next()).unwrap_or_default();
@@ -80,7 +80,7 @@ pub(super) fn printable(text: &str) -> String {
 }
 
 /// `nothing`, `a`, or `one of a, b, c`.
-pub(super) fn one_of<S: AsRef<str>>(names: &[S]) -> String {
+pub(crate) fn one_of<S: AsRef<str>>(names: &[S]) -> String {
     match names {
         [] => "nothing".to_owned(),
         [only] => only.as_ref().to_owned(),

@@ -123,3 +123,29 @@ pub(super) fn cube() -> RawMesh {
         ..RawMesh::default()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Texture coordinates of the mesh straight below the point (x, y), on the face that looks up.
+    fn uv_below(mesh: &RawMesh, x: f64, y: f64) -> Option<DVec2> {
+        mesh.triangles.iter().find_map(|triangle| {
+            let [a, b, c] = triangle.map(|i| mesh.positions[i as usize]);
+            let normal = (b - a).cross(c - a);
+            let at = DVec3::new(x, y, a.z);
+            let weights = [[b, c], [c, a], [a, b]].map(|[p, q]| (p - at).cross(q - at).z / normal.z);
+            let inside = normal.z > 0.0 && weights.iter().all(|weight| *weight >= 0.0);
+            inside.then(|| triangle.iter().zip(weights).map(|(i, weight)| mesh.uvs[*i as usize] * weight).sum())
+        })
+    }
+
+    /// What Mitsuba 3.9.1 answers at the same points.
+    #[test]
+    fn textures_lie_as_in_mitsuba() {
+        for (mesh, expected) in [(rectangle(), [0.6, 0.35]), (cube(), [0.35, 0.6])] {
+            let found = uv_below(&mesh, 0.2, -0.3);
+            assert!(found.is_some_and(|uv| (uv - DVec2::from(expected)).length() < 1e-12), "{found:?}");
+        }
+    }
+}

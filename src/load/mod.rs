@@ -1,15 +1,18 @@
-//! Mitsuba 3 scene files (XML) become a [`Scene`]: the only room that knows file formats.
+//! Mitsuba's scene files (XML) become a [`Scene`]: the only room that knows file formats.
 //!
-//! A file that loads here loads in Mitsuba 3 and shows the same picture; what of Mitsuba's format is not supported is
-//! an error that names it and says what is expected. Understood are
+//! Files of Mitsuba 2 and 3 show the picture that Mitsuba 3 makes of them. Files of Mitsuba 0.4 to 0.6 are read as they
+//! are: as Mitsuba 3 converts them, and what it refuses as Mitsuba 0.6 had it. What is not supported is an error that
+//! names it and says what is expected. Understood are
 //!
-//! - shapes `rectangle`, `cube`, `sphere`, `disk`, `obj`, `ply`;
+//! - `<include>`, `<path>`, `<default>`, `<alias>`, references;
+//! - shapes `rectangle`, `cube`, `sphere`, `disk`, `cylinder`, `obj`, `ply`, `serialized`, `shapegroup`, `instance`;
 //! - bsdfs `diffuse`, `conductor`, `roughconductor`, `dielectric`, `thindielectric`, `roughdielectric`, `plastic`,
-//!   `roughplastic`, `phong`, `null`, `mask`, `blendbsdf`, `twosided`, nested or by reference;
+//!   `roughplastic`, `principled`, `phong`, `null`, `mask`, `blendbsdf`, `bumpmap`, `normalmap`, `twosided`;
 //! - textures `bitmap`, `checkerboard`;
 //! - emitters `area`, `constant`, `envmap`, `sunsky` (also `sun`, `sky`), `point`, `spot`, `directional`;
-//! - sensors `perspective`, `thinlens` with an `hdrfilm` and the filters `box`, `tent`, `gaussian`;
-//! - any integrator's `max_depth`; samplers are read over.
+//! - colours as `<rgb>`, `<spectrum>` of values, pairs or a file; in old files also `<srgb>` and `<blackbody>`;
+//! - sensors `perspective`, `thinlens` with an `hdrfilm`, its crop, and the filters `box`, `tent`, `gaussian`;
+//! - any integrator's `max_depth` and `hide_emitters`; samplers are read over.
 
 mod bsdf;
 mod cie;
@@ -35,6 +38,7 @@ mod texture;
 mod transform;
 mod value;
 
+pub(crate) use error::one_of;
 pub use error::{LoadError, Place};
 
 use crate::camera::Camera;

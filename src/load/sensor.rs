@@ -107,7 +107,7 @@ fn half_extent(plugin: &mut Plugin<'_>, size: [usize; 2]) -> Result<DVec2, LoadE
 
 /// Tangent of half the diagonal field of view of a lens on film of 35 mm.
 fn focal_length(plugin: &mut Plugin<'_>) -> Result<f64, LoadError> {
-    // Only for its kind: what is not a number has been found to be missing.
+    // Both are given, or a `fov` that is not a number, which is refused here.
     if let Some(fov) = plugin.float("fov")? {
         return Err(fov.refuse("either `fov` or `focal_length`"));
     }

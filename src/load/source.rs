@@ -41,19 +41,27 @@ impl Source {
 
     /// The tree of the file's elements. Documents with their own entities are refused: these could grow without bound.
     pub fn parse(&self) -> Result<roxmltree::Document<'_>, LoadError> {
-        roxmltree::Document::parse(&self.text).map_err(|error| {
-            let position = error.pos();
-            let line_start: usize = self.text.split_inclusive('\n').take(position.row as usize - 1).map(str::len).sum();
-            let rest = self.text.get(line_start..).unwrap_or_default();
-            let in_line: usize = rest.chars().take(position.col as usize - 1).map(char::len_utf8).sum();
-            let message = match error {
-                roxmltree::Error::DtdDetected => {
-                    "a <!DOCTYPE> with entities is not supported; expected a scene without one".to_owned()
-                }
-                other => format!("not well-formed XML: {other}"),
-            };
-            self.error(line_start + in_line, message)
+        roxmltree::Document::parse(&self.text).map_err(|error| match error {
+            roxmltree::Error::DtdDetected => {
+                let at = self.text.find("<!DOCTYPE").unwrap_or_default();
+                self.error(at, "a <!DOCTYPE> with entities is not supported; expected a scene without one")
+            }
+            roxmltree::Error::UnclosedRootNode => self
+                .error(self.text.trim_end().len(), "not well-formed XML: the file ends before its outermost element"),
+            other => {
+                let (place, text) = (other.pos(), other.to_string());
+                // The place is said elsewhere.
+                let text = text.strip_suffix(&format!(" at {place}")).unwrap_or(&text);
+                self.error(self.offset(place), format!("not well-formed XML: {text}"))
+            }
         })
+    }
+
+    /// The byte at a place that the XML parser names.
+    fn offset(&self, place: roxmltree::TextPos) -> usize {
+        let start: usize = self.text.split_inclusive('\n').take(place.row as usize - 1).map(str::len).sum();
+        let rest = self.text.get(start..).unwrap_or_default();
+        start + rest.chars().take(place.col as usize - 1).map(char::len_utf8).sum::<usize>()
     }
 
     /// The file that `name` means: the first that exists, or the one beside this file where none does.

@@ -220,13 +220,14 @@ mod tests {
     fn spectra_have_mitsubas_colours() {
         let steps = [[400.0, 0.1], [500.0, 0.2], [600.0, 0.7], [700.0, 0.9]];
         let falling = [[400.0, 2.0], [700.0, 0.5]];
-        let cases: [(&[[f64; 2]], Meaning, [f64; 3]); 6] = [
-            (&steps, Meaning::Share, [0.856_079, 0.404_085, 0.112_402]),
+        let (rising, flat) = ([[400.0, 1.5], [700.0, 2.5]], [[300.0, 1.0], [900.0, 1.0]]);
+        let cases = [
+            (&steps[..], Meaning::Share, [0.856_079, 0.404_085, 0.112_402]),
             (&steps, Meaning::Light, [0.988_160, 0.387_351, 0.095_602]),
-            (&[[400.0, 1.5], [700.0, 2.5]], Meaning::Index, [2.2972, 1.9761, 1.6284]),
+            (&rising, Meaning::Index, [2.2972, 1.9761, 1.6284]),
             (&falling, Meaning::Share, [0.784_462, 1.0, 1.0]),
             (&falling, Meaning::Light, [0.988_927, 1.216_960, 1.636_342]),
-            (&[[300.0, 1.0], [900.0, 1.0]], Meaning::Light, [1.204_884, 0.948_228, 0.909_267]),
+            (&flat, Meaning::Light, [1.204_884, 0.948_228, 0.909_267]),
         ];
         for (pairs, meaning, expected) in cases {
             let found = colour(pairs, meaning).to_rgb();

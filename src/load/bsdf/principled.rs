@@ -1,6 +1,5 @@
 //! Parameters of Burley's model.
 
-use super::given;
 use crate::bsdf::Principled;
 use crate::load::error::LoadError;
 use crate::load::plugin::Plugin;
@@ -43,8 +42,8 @@ fn unit(plugin: &mut Plugin<'_>, name: &'static str, default: f64) -> Result<Num
 
 /// An index of 1 refracts nothing; a transparent model gets one close to it, as in Mitsuba.
 fn eta(plugin: &mut Plugin<'_>, transparent: bool) -> Result<f64, LoadError> {
-    if given(plugin, "eta") {
-        if given(plugin, "specular") {
+    if plugin.is_given("eta") {
+        if plugin.is_given("specular") {
             return Err(plugin.element.error("both `eta` and `specular`; expected one or the other"));
         }
         let eta = plugin.positive("eta")?.unwrap_or(1.5);
