@@ -70,7 +70,7 @@ const BODIES: [(&str, &str); 72] = [
     ),
     (
         r#"<bsdf type="diffuse">^<texture type="bitmap" name="reflectance"/></bsdf>"#,
-        "`reflectance` is a <texture>; expected one of <rgb>, <spectrum>, <float>",
+        "texture `bitmap` lacks the parameter `filename`",
     ),
     (r#"<bsdf type="diffuse">^<rgb name="reflectance"/></bsdf>"#, "<rgb> lacks the attribute `value`"),
     (
