@@ -190,7 +190,7 @@ fn light_starts_on_cylinders() {
     for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
         let row = [0.5, (f64::from(i) + 0.5) / f64::from(n), (f64::from(j) + 0.5) / f64::from(n), 0.5];
         let (_, start, pdf) = scene.sample_start(row).expect("a start");
-        let pathblend::emitter::Start::Surface { position, normal } = start else { panic!("{start:?}") };
+        let pathblend::emitter::Start::Surface { position, normal, .. } = start else { panic!("{start:?}") };
         assert!((position.truncate().length() - 1.0).abs() < 1e-12 && normal.z == 0.0);
         assert!((normal.truncate() - position.truncate()).length() < 1e-12);
         assert!((pdf.0 * std::f64::consts::TAU - 1.0).abs() < 1e-12);
