@@ -107,7 +107,7 @@ fn an_environment_lights_the_floor() {
             environment.radiance(&Start::Infinite { towards }, -towards).luminance()
         })
         .sum();
-    expect(&scene, 64, sum / (side * side) as f64 * PI);
+    expect(&scene, 24, sum / (side * side) as f64 * PI);
 }
 
 /// A square above the floor of which one half shines, by a texture; the other half would be as bright.

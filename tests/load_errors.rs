@@ -24,7 +24,7 @@ fn message_of(text: &str, options: &Options) -> String {
 }
 
 /// Each body with a ^ where the caret must stand, and how its message starts.
-const BODIES: [(&str, &str); 68] = [
+const BODIES: [(&str, &str); 72] = [
     // Plugins that do not exist, or not here.
     (
         r#"^<bsdf type="velvet"/>"#,
@@ -35,7 +35,14 @@ const BODIES: [(&str, &str); 68] = [
         r#"^<shape type="helix"/>"#,
         "unknown shape `helix`; expected one of rectangle, cube, sphere, disk, cylinder, obj, ply, serialized",
     ),
-    (r#"^<emitter type="laser"/>"#, "unknown emitter `laser`; expected one of "),
+    (r#"^<emitter type="projector"/>"#, "unknown emitter `projector`; expected one of constant, envmap, sunsky"),
+    (r#"^<emitter type="envmap"/>"#, "emitter `envmap` lacks the parameter `filename`"),
+    (
+        r#"<emitter type="spot"><float name="cutoff_angle" value="^0"/></emitter>"#,
+        "`cutoff_angle` is 0; expected above 0, up to 180",
+    ),
+    (r#"<emitter type="sky"><float name="turbidity" value="^11"/></emitter>"#, "`turbidity` is 11; expected 1 to 10"),
+    (r#"<emitter type="sky"/>^<emitter type="constant"/>"#, "a scene can have one environment emitter only"),
     (r#"^<emitter type="area"/>"#, "an area emitter shines from a shape"),
     (
         r#"<shape type="sphere">^<emitter type="point"/></shape>"#,

@@ -29,8 +29,14 @@ pub struct Facet {
     uvs: [Vec2; 3],
 }
 
-/// Along each side of a triangle so many points tell how bright a textured one is.
-const PROBES: usize = 4;
+/// Along each side of a triangle, or axis of a solid, so many points tell how bright a textured one is.
+const PROBES: [usize; 2] = [4, 32];
+
+/// Calls `at` with the middles of a square's `count` × `count` cells, and takes the mean.
+fn mean(count: usize, at: impl Fn([f64; 2]) -> f64) -> f64 {
+    let middle = |i: usize| (i as f64 + 0.5) / count as f64;
+    (0..count * count).map(|i| at([middle(i / count), middle(i % count)])).sum::<f64>() / (count * count) as f64
+}
 
 /// A surface that points are sampled on.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,7 +69,7 @@ impl Surface {
         }
     }
 
-    /// A point with its normal and texture coordinates, uniformly by area.
+    /// A point with its normal and, on triangles, its texture coordinates, uniformly by area.
     #[inline]
     fn sample(&self, row: Row) -> (DVec3, DVec3, DVec2) {
         match self {
@@ -90,13 +96,15 @@ impl Surface {
         }
     }
 
-    /// The integral of `radiance` over the surface, as a luminance; of a texture by some points on each triangle.
+    /// The integral of `radiance` over the surface, as a luminance; of a texture by some points.
     fn integral(&self, radiance: &Colour) -> f64 {
-        match self {
-            Self::Triangles { facets, .. } if !radiance.is_constant() => {
-                facets.iter().map(|facet| facet.area * facet.mean(radiance)).sum()
+        match (self, radiance) {
+            (_, Colour::Constant(radiance)) => self.area() * radiance.luminance(),
+            (Self::Triangles { facets, .. }, _) => facets.iter().map(|facet| facet.area * facet.mean(radiance)).sum(),
+            (Self::Solid(solid), _) => {
+                let uv = |[u, v]: [f64; 2]| solid.chart(self.sample([0.0, u, v, 0.0]).0).uv;
+                self.area() * mean(PROBES[1], |u| radiance.at(uv(u)).luminance().max(0.0))
             }
-            _ => self.area() * radiance.at(DVec2::ZERO).luminance(),
         }
     }
 }
@@ -116,10 +124,7 @@ impl Facet {
     }
 
     fn mean(&self, radiance: &Colour) -> f64 {
-        let middle = |i: usize| (i as f64 + 0.5) / PROBES as f64;
-        let probe = |i| warp::triangle::sample([middle(i / PROBES), middle(i % PROBES)]);
-        let luminance = |i| radiance.at(self.uv(probe(i))).luminance().max(0.0);
-        (0..PROBES * PROBES).map(luminance).sum::<f64>() / (PROBES * PROBES) as f64
+        mean(PROBES[0], |u| radiance.at(self.uv(warp::triangle::sample(u))).luminance().max(0.0))
     }
 }
 
@@ -132,7 +137,10 @@ impl Area {
 
     #[inline]
     pub(super) fn start(&self, row: Row) -> (Start, AreaPdf) {
-        let (position, normal, uv) = self.surface.sample(row);
+        let (position, normal, mut uv) = self.surface.sample(row);
+        if let (Surface::Solid(solid), Colour::Textured(_)) = (&self.surface, &self.radiance) {
+            uv = solid.chart(position).uv;
+        }
         (Start::Surface { position, normal, uv }, self.start_pdf())
     }
 

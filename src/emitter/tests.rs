@@ -57,6 +57,7 @@ fn all() -> Vec<Emitter> {
     let others = [
         Emitter::Area(Area::new(grey.into(), Surface::Solid(sphere))),
         Emitter::Area(textured()),
+        Emitter::Area(Area::new(textured().radiance, Surface::Solid(sphere))),
         Emitter::Point(Point { position: DVec3::ONE, intensity: grey }),
         Emitter::Spot(spot()),
         Emitter::Spot(Spot { beam: spot().cutoff, ..spot() }),
@@ -86,6 +87,16 @@ fn textured_lights_shine_by_their_texture() {
         let found = area.radiance(&start, DVec3::Z);
         assert!((found.luminance() - position.x).abs() < 1e-7, "{found:?} {position}");
         assert!(area.radiance(&start, -DVec3::Z).is_black());
+    }
+    // A sphere has u = 1/2 at −x and v, which the texture leaves aside, along z.
+    let ball = crate::geometry::Solid::sphere(DVec3::ZERO, 1.0);
+    let area = Emitter::Area(Area::new(textured().radiance, Surface::Solid(ball)));
+    for _ in 0..1000 {
+        let (start, _) = area.start(stream.row());
+        let Start::Surface { position, normal, .. } = start else { unreachable!() };
+        let turn = 0.5 + (-position.y).atan2(-position.x) / TAU;
+        let found = area.radiance(&start, normal).luminance();
+        assert!((found - (2.0 * turn - 0.5).clamp(0.0, 1.0)).abs() < 1e-7, "{found} {position}");
     }
 }
 

@@ -114,9 +114,6 @@ pub(super) fn read<'a>(element: Element<'a>, outer: &DAffine3) -> Result<Shape<'
         let message = format!("a {kind} that shines inwards is not supported; its normals must point outwards");
         return Err(element.error(message));
     }
-    if matches!((&form, &radiance), (Form::Solid(_), Some(Colour::Textured(_)))) {
-        return Err(element.error("a sphere or disk that shines by a texture is not supported; expected a mesh"));
-    }
     Ok(Shape { form, bsdf, turned, radiance, file })
 }
 
