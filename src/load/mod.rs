@@ -5,7 +5,8 @@
 //!
 //! - shapes `rectangle`, `cube`, `sphere`, `disk`, `obj`, `ply`;
 //! - bsdfs `diffuse`, `conductor`, `roughconductor`, `dielectric`, `thindielectric`, `roughdielectric`, `plastic`,
-//!   `roughplastic`, `phong`, `null`, `mask`, `blendbsdf`, `twosided`, nested or by reference;
+//!   `roughplastic`, `phong`, `coating`, `roughcoating`, `principled`, `null`, `mask`, `blendbsdf`, `twosided`, nested or
+//!   by reference;
 //! - emitters `area`, `constant`, `point`;
 //! - sensors `perspective`, `thinlens` with an `hdrfilm` and the filters `box`, `tent`, `gaussian`;
 //! - any integrator's `max_depth`; samplers are read over.
