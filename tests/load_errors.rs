@@ -24,12 +24,12 @@ fn message_of(text: &str, options: &Options) -> String {
 }
 
 /// Each body with a ^ where the caret must stand, and how its message starts.
-const BODIES: [(&str, &str); 72] = [
+const BODIES: [(&str, &str); 84] = [
     // Plugins that do not exist, or not here.
     (
         r#"^<bsdf type="velvet"/>"#,
         "unknown bsdf `velvet`; expected one of diffuse, conductor, roughconductor, dielectric, thindielectric, roughdielectric, plastic, \
-         roughplastic, phong, principled, null, mask, blendbsdf, twosided, bumpmap, normalmap",
+         roughplastic, phong, coating, roughcoating, principled, null, mask, blendbsdf, twosided, bumpmap, normalmap",
     ),
     (
         r#"^<shape type="helix"/>"#,
@@ -118,6 +118,48 @@ const BODIES: [(&str, &str); 72] = [
         r#"<bsdf type="dielectric"><string name="ext_ior" value="^honey"/></bsdf>"#,
         "`ext_ior` is honey; expected a number above 0 or one of vacuum, helium",
     ),
+    (r#"^<bsdf type="mask"/>"#, "a mask with 0 nested <bsdf>; expected one"),
+    (
+        r#"^<bsdf type="blendbsdf"><bsdf type="diffuse"/><bsdf type="diffuse"/></bsdf>"#,
+        "bsdf `blendbsdf` lacks the parameter `weight`",
+    ),
+    (
+        r#"^<bsdf type="blendbsdf"><float name="weight" value="0.5"/><bsdf type="diffuse"/></bsdf>"#,
+        "a blendbsdf with 1 nested <bsdf>; expected two",
+    ),
+    (
+        r#"<bsdf type="twosided"><bsdf type="^mask"><bsdf type="diffuse"/></bsdf></bsdf>"#,
+        "a twosided bsdf cannot hold `mask`; expected an opaque bsdf",
+    ),
+    (
+        r#"^<bsdf type="mask" id="a"><ref id="a"/></bsdf>"#,
+        "bsdfs nested more than 16 deep; do references run in a circle?",
+    ),
+    (
+        r#"^<bsdf type="roughdielectric"><float name="int_ior" value="1.5"/><float name="ext_ior" value="1.5"/></bsdf>"#,
+        "`int_ior` equals `ext_ior`; expected two indices that differ",
+    ),
+    (
+        r#"^<bsdf type="roughconductor"><float name="alpha" value="1"/><float name="alpha_u" value="1"/></bsdf>"#,
+        "both `alpha` and `alpha_u`, `alpha_v`; expected one or the other",
+    ),
+    (
+        r#"<bsdf type="conductor"><rgb name="eta" value="1"/><string name="material" value="^Au"/></bsdf>"#,
+        "`material` is Au; expected either `material` or `eta` and `k`",
+    ),
+    (
+        r#"^<bsdf type="principled"><float name="sheen" value="2"/></bsdf>"#,
+        "`sheen` is 2; expected a number from 0 to 1",
+    ),
+    (
+        r#"^<bsdf type="principled"><float name="eta" value="1.5"/><float name="specular" value="0.5"/></bsdf>"#,
+        "both `eta` and `specular`; expected one or the other",
+    ),
+    (
+        r#"^<bsdf type="coating"><bsdf type="dielectric"/></bsdf>"#,
+        "a coating over a transparent bsdf; expected an opaque one",
+    ),
+    (r#"^<bsdf type="bumpmap"><bsdf type="diffuse"/></bsdf>"#, "bsdf `bumpmap` lacks the parameter `map`"),
     (r#"^<bsdf type="twosided"/>"#, "a twosided bsdf with 0 nested <bsdf>; expected one or two"),
     (
         r#"<bsdf type="twosided"><bsdf type="^dielectric"/></bsdf>"#,

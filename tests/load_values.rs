@@ -3,7 +3,10 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use glam::DVec3;
-use pathblend::bsdf::{Bsdf, Conductor, Dielectric, Diffuse, Distribution, RoughConductor, Roughness};
+use pathblend::bsdf::{
+    Bsdf, Conductor, Dielectric, Diffuse, Distribution, Mask, Phong, Plastic, RoughConductor, RoughDielectric,
+    RoughPlastic, Roughness,
+};
 use pathblend::film::Filter;
 use pathblend::load::{self, Options, UNBOUNDED_DEPTH};
 use pathblend::scene::{Caster, Scene};
@@ -65,6 +68,42 @@ fn bsdfs_have_their_parameters() {
     let paper = r#"<bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="0.2"/></bsdf>
         <bsdf type="conductor"/></bsdf>"#;
     assert_eq!(bsdfs(paper), [Bsdf::TwoSided(Box::new([grey(0.2), Bsdf::Conductor(MIRROR)]))]);
+}
+
+#[test]
+fn layered_and_rough_models_have_mitsubas_defaults() {
+    let (one, half) = (|| Colour::from(Spectrum::ONE), || Colour::from(Spectrum::grey(0.5)));
+    let eta = 1.49 / 1.000277;
+    assert_eq!(bsdfs("<bsdf type=\"plastic\"/>"), [Bsdf::Plastic(Plastic::new(eta, half(), one(), false))]);
+    let coat = (Distribution::Beckmann, 0.1, true);
+    let rough = Bsdf::RoughPlastic(Box::new(RoughPlastic::new(eta, coat, half(), one(), false)));
+    assert_eq!(bsdfs("<bsdf type=\"roughplastic\"/>"), [rough]);
+    let frosted = RoughDielectric {
+        eta: 1.5046 / 1.000277,
+        roughness: Roughness::isotropic(Distribution::Beckmann, 0.1),
+        specular_reflectance: Spectrum::ONE,
+        specular_transmittance: Spectrum::ONE,
+    };
+    assert_eq!(bsdfs("<bsdf type=\"roughdielectric\"/>"), [Bsdf::RoughDielectric(frosted)]);
+    let phong =
+        Phong { exponent: 30.0.into(), specular_reflectance: Spectrum::grey(0.2).into(), diffuse_reflectance: half() };
+    assert_eq!(bsdfs("<bsdf type=\"phong\"/>"), [Bsdf::Phong(phong)]);
+    let mask = Mask { opacity: 0.5.into(), nested: Box::new(grey(0.5)) };
+    assert_eq!(bsdfs("<bsdf type=\"mask\"><bsdf type=\"diffuse\"/></bsdf>"), [Bsdf::Mask(mask)]);
+    assert_eq!(bsdfs("<bsdf type=\"null\"/>"), [Bsdf::Null]);
+}
+
+#[test]
+fn rough_metals_have_their_parameters() {
+    let brushed = r#"<bsdf type="roughconductor"><string name="material" value="Cu"/> <float name="ext_eta" value="2"/>
+        <float name="alpha_u" value="0.2"/> <float name="alpha_v" value="0.4"/>
+        <boolean name="sample_visible" value="false"/></bsdf>"#;
+    let [Bsdf::RoughConductor(RoughConductor { metal, roughness })] = &bsdfs(brushed)[..] else { panic!("a metal") };
+    let (eta, k) = metal.index.unwrap();
+    let close = |a: Spectrum, b: [f64; 3]| a.to_rgb().iter().zip(b).all(|(a, b)| (2.0 * a - b).abs() < 1e-5);
+    assert!(close(eta, [0.201005, 0.923750, 1.102215]) && close(k, [3.913262, 2.453045, 2.142090]));
+    assert_eq!((roughness.alpha_u.clone(), roughness.alpha_v.clone()), (0.2.into(), 0.4.into()));
+    assert!(!roughness.visible);
 }
 
 #[test]

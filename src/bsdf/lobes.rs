@@ -21,7 +21,7 @@ pub(super) fn unchoose((is_first, rest): (bool, f64), first: f64) -> f64 {
 /// Which of two lobes has sampled a direction, drawn by `gamma` in proportion to their densities.
 #[inline]
 pub(super) fn guess(gamma: f64, first: f64, second: f64) -> (bool, f64) {
-    choose(gamma, if first > 0.0 { first / (first + second) } else { 0.0 })
+    choose(gamma, share(first, second))
 }
 
 /// Probability of the first of two lobes with these weights.

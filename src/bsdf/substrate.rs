@@ -25,7 +25,8 @@ impl Substrate {
     pub(super) fn value(&self, uv: DVec2, pass_i: f64, pass_o: f64) -> Spectrum {
         let factor = FRAC_1_PI * pass_i * pass_o / (self.eta * self.eta);
         self.reflectance.at(uv).map(|base| {
-            let again = if self.nonlinear { base * self.internal } else { self.internal };
+            // Textures may hold more than 1, where the series would not end.
+            let again = if self.nonlinear { base.min(1.0) * self.internal } else { self.internal };
             factor * base / (1.0 - again)
         })
     }

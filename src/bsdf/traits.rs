@@ -1,6 +1,6 @@
 //! What integrators ask of a model before they look at directions.
 
-use super::{Bsdf, flip};
+use super::{Bsdf, Letter, flip};
 use crate::texture::Number;
 use glam::DVec3;
 
@@ -17,6 +17,7 @@ impl Bsdf {
             | Self::RoughPlastic(_)
             | Self::Phong(_)
             | Self::Principled(_) => false,
+            Self::Coating(coating) => coating.rough.is_none() && coating.nested.is_delta(wi),
             Self::Mask(mask) => mask.nested.is_delta(wi),
             Self::Blend(blend) => blend.nested.iter().all(|nested| nested.is_delta(wi)),
             Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].is_delta(wi),
@@ -37,6 +38,7 @@ impl Bsdf {
             | Self::RoughPlastic(_)
             | Self::Phong(_)
             | Self::Principled(_) => false,
+            Self::Coating(coating) => coating.rough.is_none() || coating.nested.has_delta(wi),
             Self::Blend(blend) => blend.nested.iter().any(|nested| nested.has_delta(wi)),
             Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].has_delta(wi),
             Self::TwoSided(sides) => sides[1].has_delta(flip(wi)),
@@ -53,6 +55,10 @@ impl Bsdf {
             Self::RoughDielectric(rough) => rough.roughness.gathers(),
             Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) | Self::Null => false,
             Self::Principled(principled) => principled.gathers(),
+            Self::Coating(coating) => {
+                let rough = coating.rough.as_ref().map(|rough| rough.microfacet.letter());
+                rough == Some(Letter::D) || coating.nested.gathers(wi)
+            }
             Self::Mask(mask) => mask.nested.gathers(wi),
             Self::Blend(blend) => blend.nested.iter().any(|nested| nested.gathers(wi)),
             Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].gathers(wi),
@@ -73,6 +79,7 @@ impl Bsdf {
             | Self::Plastic(_)
             | Self::RoughPlastic(_)
             | Self::Phong(_)
+            | Self::Coating(_)
             | Self::TwoSided(_) => false,
             Self::Principled(principled) => principled.transmits(),
             Self::Blend(blend) => blend.nested.iter().any(Self::transmits),
@@ -86,6 +93,7 @@ impl Bsdf {
             Self::RoughConductor(rough) => rough.roughness.is_isotropic(),
             Self::RoughDielectric(rough) => rough.roughness.is_isotropic(),
             Self::Principled(principled) => matches!(principled.anisotropic, Number::Constant(0.0)),
+            Self::Coating(coating) => coating.nested.is_isotropic(),
             Self::Mask(mask) => mask.nested.is_isotropic(),
             Self::Blend(blend) => blend.nested.iter().all(Self::is_isotropic),
             Self::TwoSided(sides) => sides.iter().all(Self::is_isotropic),
@@ -123,6 +131,7 @@ impl Bsdf {
                     && phong.exponent.is_constant()
             }
             Self::Principled(principled) => principled.is_constant(),
+            Self::Coating(coating) => coating.specular_reflectance.is_constant() && coating.nested.is_constant(),
             Self::Mask(mask) => mask.opacity.is_constant() && mask.nested.is_constant(),
             Self::Blend(blend) => blend.weight.is_constant() && blend.nested.iter().all(Self::is_constant),
             Self::TwoSided(sides) => sides.iter().all(Self::is_constant),

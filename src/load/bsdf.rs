@@ -10,13 +10,13 @@ use super::error::{LoadError, one_of};
 use super::ior;
 use super::plugin::Plugin;
 use crate::bsdf::{
-    Blend, Bsdf, Conductor, Dielectric, Diffuse, Mask, Phong, Plastic, RoughConductor, RoughDielectric, RoughPlastic,
-    ThinDielectric,
+    Blend, Bsdf, Coating, Conductor, Dielectric, Diffuse, Mask, Phong, Plastic, RoughCoat, RoughConductor,
+    RoughDielectric, RoughPlastic, ThinDielectric,
 };
 use crate::spectrum::Spectrum;
 use crate::texture::{Colour, Relief};
 
-const KINDS: [&str; 16] = [
+const KINDS: [&str; 18] = [
     "diffuse",
     "conductor",
     "roughconductor",
@@ -26,6 +26,8 @@ const KINDS: [&str; 16] = [
     "plastic",
     "roughplastic",
     "phong",
+    "coating",
+    "roughcoating",
     "principled",
     "null",
     "mask",
@@ -94,6 +96,7 @@ impl Reader {
                 nested: Box::new(self.one(&mut plugin)?),
             }),
             "blendbsdf" => Bsdf::Blend(self.blend(&mut plugin)?),
+            "coating" | "roughcoating" => Bsdf::Coating(Box::new(self.coating(&mut plugin)?)),
             "twosided" => self.two_sided(&mut plugin)?,
             "bumpmap" | "normalmap" => self.relief(&mut plugin)?,
             _ => plain(&mut plugin)?,
@@ -125,6 +128,25 @@ impl Reader {
             return Err(plugin.element.error(message));
         };
         Ok(Blend { weight, nested: Box::new([self.read(first)?, self.read(second)?]) })
+    }
+
+    /// The layers of Mitsuba 0.6.
+    fn coating(&mut self, plugin: &mut Plugin<'_>) -> Result<Coating, LoadError> {
+        let eta = relative_index(plugin, ior::BK7)?;
+        let thickness = plugin.positive("thickness")?.unwrap_or(1.0);
+        let valid = |colour: &Spectrum| colour.is_valid();
+        let absorption = plugin.colour("sigma_a")?.map(|c| c.check(valid, "values of at least 0")).transpose()?;
+        let rough = plugin.kind == "roughcoating";
+        let rough = if rough { Some(RoughCoat::new(eta, microfacet::constant(plugin)?)) } else { None };
+        let specular_reflectance = plugin.colour_texture("specular_reflectance", 1.0)?;
+        let nested = self.one(plugin)?;
+        if nested.transmits() {
+            return Err(plugin
+                .element
+                .error(format!("a {} over a transparent bsdf; expected an opaque one", plugin.kind)));
+        }
+        let depth = absorption.unwrap_or(Spectrum::BLACK) * thickness;
+        Ok(Coating { eta, depth, rough, specular_reflectance, nested: Box::new(nested) })
     }
 
     fn two_sided(&mut self, plugin: &mut Plugin<'_>) -> Result<Bsdf, LoadError> {

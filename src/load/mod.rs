@@ -7,7 +7,7 @@
 //! - `<include>`, `<path>`, `<default>`, `<alias>`, references;
 //! - shapes `rectangle`, `cube`, `sphere`, `disk`, `cylinder`, `obj`, `ply`, `serialized`, `shapegroup`, `instance`;
 //! - bsdfs `diffuse`, `conductor`, `roughconductor`, `dielectric`, `thindielectric`, `roughdielectric`, `plastic`,
-//!   `roughplastic`, `principled`, `phong`, `null`, `mask`, `blendbsdf`, `bumpmap`, `normalmap`, `twosided`;
+//!   `roughplastic`, `principled`, `phong`, `coating`, `roughcoating`, `null`, `mask`, `blendbsdf`, `bumpmap`, `normalmap`, `twosided`;
 //! - textures `bitmap`, `checkerboard`;
 //! - emitters `area`, `constant`, `envmap`, `sunsky` (also `sun`, `sky`), `point`, `spot`, `directional`;
 //! - colours as `<rgb>`, `<spectrum>` of values, pairs or a file; in old files also `<srgb>` and `<blackbody>`;

@@ -74,7 +74,7 @@ def anisotropic(kind, distribution, inside):
 
 
 def directions(model, source):
-    """Half of the pairs along samples of the model, where its lobes are."""
+    """More than half of the pairs along samples of the model, where its lobes are."""
     while True:
         wi = mi.warp.square_to_uniform_sphere(mi.Point2f(source.random(), source.random()))
         if abs(wi.z) < 0.1:

@@ -4,6 +4,7 @@ use super::{Clearcoat, Principled};
 use crate::bsdf::{Distribution, Evaluation, Letter, Microfacet, flip, fresnel, lobes};
 use crate::math::{SolidAnglePdf, Walk, warp::hemisphere};
 use crate::spectrum::Spectrum;
+use crate::texture::Number;
 use glam::{DVec2, DVec3};
 use std::f64::consts::FRAC_1_PI;
 
@@ -60,19 +61,21 @@ fn mix(a: f64, b: f64, t: f64) -> f64 {
 
 impl Local {
     pub fn of(model: &Principled, uv: DVec2) -> Self {
-        let (roughness, aspect) = (model.roughness.at(uv), (1.0 - 0.9 * model.anisotropic.at(uv)).sqrt());
+        // Textures may hold other numbers.
+        let unit = |number: &Number| number.at(uv).clamp(0.0, 1.0);
+        let (roughness, aspect) = (unit(&model.roughness), (1.0 - 0.9 * unit(&model.anisotropic)).sqrt());
         let alpha = DVec2::new(1.0 / aspect, aspect) * roughness * roughness;
         Self {
             color: model.base_color.at(uv),
             roughness,
-            metallic: model.metallic.at(uv),
-            spec_trans: model.spec_trans.at(uv),
-            spec_tint: model.spec_tint.at(uv),
-            sheen: model.sheen.at(uv),
-            sheen_tint: model.sheen_tint.at(uv),
-            flatness: model.flatness.at(uv),
+            metallic: unit(&model.metallic),
+            spec_trans: unit(&model.spec_trans),
+            spec_tint: unit(&model.spec_tint),
+            sheen: unit(&model.sheen),
+            sheen_tint: unit(&model.sheen_tint),
+            flatness: unit(&model.flatness),
             eta: model.eta,
-            coat: Clearcoat::of(model.clearcoat.at(uv), model.clearcoat_gloss.at(uv)),
+            coat: Clearcoat::of(unit(&model.clearcoat), unit(&model.clearcoat_gloss)),
             microfacet: Microfacet {
                 distribution: Distribution::Ggx,
                 alpha: alpha.max(DVec2::splat(0.001)),

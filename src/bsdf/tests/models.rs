@@ -112,6 +112,12 @@ fn principled(
     }))
 }
 
+fn coating(eta: f64, depth: f64, rough: Option<(Distribution, f64)>, nested: Bsdf) -> Bsdf {
+    let rough = rough.map(|(distribution, alpha)| RoughCoat::new(eta, (distribution, alpha, true)));
+    let (depth, specular_reflectance) = (Spectrum::rgb(depth, 0.5 * depth, 0.0), Spectrum::ONE.into());
+    Bsdf::Coating(Box::new(Coating { eta, depth, rough, specular_reflectance, nested: Box::new(nested) }))
+}
+
 /// Sweeps of distributions, roughnesses and indices.
 fn microfacets() -> Vec<Case> {
     let mut cases = Vec::new();
@@ -173,6 +179,13 @@ pub fn cases() -> Vec<Case> {
         mixture("principled cloth", principled([0.7, 0.0, 0.0, 0.0], [0.5, 0.5, 0.5, 0.0])),
         mixture("principled coat", principled([0.6, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0])),
         mixture("principled all", principled([0.4, 0.3, 0.5, 0.5], [0.5, 0.2, 0.5, 0.5])),
+        case("coating of diffuse", coating(1.5, 0.0, None, diffuse())),
+        case("coating of metal", coating(1.3, 0.4, None, brushed())),
+        case("coating of a mirror", coating(1.5, 0.4, None, mirror())),
+        mixture("rough coating of diffuse", coating(1.5, 0.2, Some((Distribution::Ggx, 0.1)), diffuse())),
+        mixture("rough coating of metal", coating(1.5, 0.0, Some((Distribution::Beckmann, 0.3)), brushed())),
+        mixture("rough coating of a mirror", coating(1.5, 0.0, Some((Distribution::Beckmann, 0.2)), mirror())),
+        mixture("coating of phong", coating(1.5, 0.2, None, phong(20.0))),
         mixture("two-sided", Bsdf::TwoSided(Box::new([phong(20.0), brushed()]))),
         case("two-sided plastic", Bsdf::TwoSided(Box::new([plastic(1.5, true), plastic(1.2, false)]))),
         case("turned plastic", Bsdf::Turned(Box::new(plastic(1.5, true)))),
