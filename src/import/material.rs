@@ -12,6 +12,9 @@ use crate::spectrum::Spectrum;
 /// Roughness below which pbrt takes a surface for smooth.
 const SMOOTH: f64 = 1e-3;
 
+/// Most elements of one material.
+const MOST_ELEMENTS: usize = 1000;
+
 const MATERIALS: [&str; 25] = [
     "diffuse",
     "coateddiffuse",
@@ -242,6 +245,12 @@ impl Importer<'_> {
         let [first, second] = &names[..] else {
             return Err(params.spot.error(format!("found {} materials in a mix; expected 2", names.len())));
         };
+        // Each use is a copy: mixes of mixes of mixes would grow without bound.
+        if first.node.count() + second.node.count() > MOST_ELEMENTS {
+            let message =
+                format!("found a mix of more than {MOST_ELEMENTS} elements; expected fewer mixes inside mixes");
+            return Err(params.spot.error(message));
+        }
         let amount = self.texture(params, "amount", 0.5)?;
         self.check_factor(&amount, &params.spot);
         let transmissive = [first, second].iter().any(|material| material.transmissive || material.opacity.is_some());

@@ -7,6 +7,7 @@
 mod camera;
 mod coated;
 mod colour;
+mod gzip;
 mod interpret;
 mod light;
 mod material;

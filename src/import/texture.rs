@@ -12,7 +12,10 @@ use glam::DVec2;
 /// Classes that are understood.
 const CLASSES: [&str; 5] = ["constant", "scale", "mix", "checkerboard", "imagemap"];
 
-/// Classes whose value in the middle of their range stands in for them: what of them is not known is grey.
+/// Most textures in one: each use is a copy.
+const MOST: usize = 100;
+
+/// The value that stands in for classes that are not known.
 const GREY: f64 = 0.5;
 
 /// A value that may vary over a surface.
@@ -53,6 +56,14 @@ impl Texture {
                 let [a, b] = *sides;
                 Self::Checker { sides: Box::new([a.times(factor), b.times(factor)]), to_uv }
             }
+        }
+    }
+
+    /// How many textures there are in it.
+    fn count(&self) -> usize {
+        match self {
+            Self::Checker { sides, .. } => sides[0].count() + sides[1].count(),
+            _ => 1,
         }
     }
 
@@ -178,7 +189,13 @@ impl Importer<'_> {
             self.report.approximated(&params.spot, "a checkerboard in space: one in texture coordinates");
         }
         params.ignore(&["aamode"]);
-        let sides = Box::new([self.texture(params, "tex1", 1.0)?, self.texture(params, "tex2", 0.0)?]);
+        let sides = [self.texture(params, "tex1", 1.0)?, self.texture(params, "tex2", 0.0)?];
+        if sides.iter().map(Texture::count).sum::<usize>() > MOST {
+            let message =
+                format!("found a checkerboard of more than {MOST} textures; expected fewer inside each other");
+            return Err(params.spot.error(message));
+        }
+        let sides = Box::new(sides);
         // Mitsuba's pattern has two fields per unit.
         let to_uv = self.mapping(params, 0.5)?.unwrap_or_else(|| uv_node(DVec2::splat(0.5), DVec2::ZERO));
         Ok(Texture::Checker { sides, to_uv })
