@@ -194,6 +194,9 @@ fn materials_and_textures_become_mitsubas() {
     assert_eq!((value(film, "crop_offset_x"), value(film, "crop_width")), ("16", "32"));
     assert_eq!(value(elements(&tree, "sensor", "thinlens")[0], "focus_distance"), "8");
     assert_eq!(report.notes.iter().filter(|note| note.change == Change::LeftOut).count(), 0);
+    // Mitsuba's images have no factor: this one was multiplied.
+    let pictures: Vec<_> = elements(&tree, "texture", "bitmap").iter().map(|node| value(*node, "filename")).collect();
+    assert_eq!(pictures.iter().filter(|name| **name == "meshes/out_001.exr").count(), 1, "{pictures:?}");
 }
 
 #[test]

@@ -7,7 +7,7 @@ use super::params::{COLOURS, Params};
 use super::source::Spot;
 use super::texture::grey;
 use super::xml::Node;
-use crate::image::Image;
+use crate::image::{Image, Precision};
 use crate::load::LoadError;
 use crate::spectrum::Spectrum;
 use glam::{DAffine3, DMat3, DVec3};
@@ -138,7 +138,7 @@ impl Importer<'_> {
             Some(image) => {
                 self.report.approximated(&file.spot, "an octahedral environment: resampled by latitude and longitude");
                 let resampled = octahedral::to_equirectangular(&image);
-                (self.out.image(&resampled).map_err(|error| file.spot.error(error))?, Y_UP)
+                (self.out.image(&resampled, Precision::Float).map_err(|error| file.spot.error(error))?, Y_UP)
             }
             None => (self.resource(&file)?, Y_UP_MIRRORED),
         };
