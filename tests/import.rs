@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use assert_cmd::Command;
+use pathblend::image::{Image, WriteOptions};
 use pathblend::import::{Change, ImportError, Options, Report, import};
 use pathblend::integrators::{Budget, Method, Settings, render};
 use pathblend::load;
@@ -168,6 +169,27 @@ fn lights_keep_their_places_and_powers() {
     close(&[radiance], &[1.0]);
     let notes: Vec<_> = report.notes.iter().map(|note| (note.change, note.line)).collect();
     assert_eq!(notes, [(Change::Approximated, 10), (Change::LeftOut, 12)]);
+}
+
+#[test]
+fn environments_are_resampled_where_they_are_square() {
+    for (size, name, notes) in [([16, 16], "meshes/out_001.exr", 1), ([32, 16], "sky.exr", 0)] {
+        let folder = tempfile::tempdir().unwrap();
+        Image::new(size[0], size[1]).write(&folder.path().join("sky.exr"), &WriteOptions::default()).unwrap();
+        let text =
+            "WorldBegin LightSource \"infinite\" \"string filename\" \"sky.exr\" \"float scale\" 3 Shape \"sphere\"";
+        fs::write(folder.path().join("s.pbrt"), text).unwrap();
+        let output = folder.path().join("out.xml");
+        let report = import(&folder.path().join("s.pbrt"), &output, &Options::default()).unwrap();
+        let text = fs::read_to_string(output).unwrap();
+        let tree = roxmltree::Document::parse(&text).unwrap();
+        let sky = elements(&tree, "emitter", "envmap")[0];
+        assert_eq!((value(sky, "filename"), value(sky, "scale"), report.notes.len()), (name, "3", notes));
+        // Mitsuba's up, +y, is +z here.
+        let cells = matrix(sky);
+        close(&[cells[1], cells[5], cells[9]], &[0., 0., 1.]);
+        assert!(folder.path().join(name).is_file());
+    }
 }
 
 #[test]
