@@ -166,7 +166,7 @@ fn share(at: impl Fn(f64) -> f64) -> Spectrum {
 }
 
 /// XYZ of white in Rec.709 (D65).
-const WHITE: DVec3 = DVec3::new(0.950_456, 1.0, 1.089_058);
+const WHITE: DVec3 = DVec3::new(0.950_47, 1.0, 1.088_83);
 
 fn integrate(at: impl Fn(f64) -> f64) -> DVec3 {
     (0..=94).map(|step| 360.0 + 5.0 * f64::from(step)).map(|wavelength| matching(wavelength) * at(wavelength)).sum()

@@ -7,7 +7,7 @@ use super::params::{COLOURS, Params};
 use super::source::Spot;
 use super::texture::grey;
 use super::xml::Node;
-use crate::image::Image;
+use crate::image::{Image, Precision};
 use crate::load::LoadError;
 use crate::spectrum::Spectrum;
 use glam::{DAffine3, DMat3, DVec3};
@@ -49,10 +49,7 @@ impl Importer<'_> {
     /// The emitter of a shape of this area.
     pub(super) fn area_node(&mut self, light: &AreaLight, area: Option<f64>) -> Node {
         let radiance = match (light.power, area) {
-            (Some(power), Some(area)) if area > 0.0 => {
-                let luminance = grey(light.radiance).max(f64::MIN_POSITIVE);
-                light.radiance * (power / (PI * area * luminance))
-            }
+            (Some(power), Some(area)) if area > 0.0 => with_luminance(light.radiance, power / (PI * area)),
             (Some(_), _) => {
                 self.report.left_out(&light.spot, "the power of an area light");
                 light.radiance
@@ -127,7 +124,7 @@ impl Importer<'_> {
         let radiance = self.radiance(params, "L")?;
         let illuminance = params.positive("illuminance")?;
         let Some(file) = file else {
-            let radiance = illuminance.map_or(radiance, |lux| radiance * (lux / (PI * grey(radiance))));
+            let radiance = illuminance.map_or(radiance, |lux| with_luminance(radiance, lux / PI));
             return Ok(Node::new("emitter", "constant").rgb("radiance", radiance));
         };
         if illuminance.is_some() {
@@ -141,7 +138,7 @@ impl Importer<'_> {
             Some(image) => {
                 self.report.approximated(&file.spot, "an octahedral environment: resampled by latitude and longitude");
                 let resampled = octahedral::to_equirectangular(&image);
-                (self.out.image(&resampled).map_err(|error| file.spot.error(error))?, Y_UP)
+                (self.out.image(&resampled, Precision::Float).map_err(|error| file.spot.error(error))?, Y_UP)
             }
             None => (self.resource(&file)?, Y_UP_MIRRORED),
         };
@@ -158,7 +155,7 @@ impl Importer<'_> {
         let to = params.triple("to")?.unwrap_or(DVec3::Z);
         let irradiance = self.radiance(params, "L")?;
         let illuminance = params.positive("illuminance")?;
-        let irradiance = illuminance.map_or(irradiance, |lux| irradiance * (lux / grey(irradiance)));
+        let irradiance = illuminance.map_or(irradiance, |lux| with_luminance(irradiance, lux));
         let direction = self.state.transform.transform_vector3(to - from).try_normalize();
         let direction = direction.ok_or_else(|| params.spot.error("found `from` at `to`; expected two points"))?;
         let node = Node::new("emitter", "directional").triple("vector", "direction", direction);
@@ -169,7 +166,7 @@ impl Importer<'_> {
         let from = params.triple("from")?.unwrap_or(DVec3::ZERO);
         let intensity = self.radiance(params, "I")?;
         let power = params.positive("power")?;
-        let intensity = power.map_or(intensity, |power| intensity * (power / (4.0 * PI * grey(intensity))));
+        let intensity = power.map_or(intensity, |power| with_luminance(intensity, power / (4.0 * PI)));
         let position = self.state.transform.transform_point3(from);
         Ok(Node::new("emitter", "point").triple("point", "position", position).rgb("intensity", intensity))
     }
@@ -191,7 +188,7 @@ impl Importer<'_> {
         if let Some(power) = params.positive("power")? {
             let (inner, outer) = ((cone - delta).to_radians().cos(), cone.to_radians().cos());
             let angle = 2.0 * PI * ((1.0 - inner) + 0.5 * (inner - outer));
-            intensity = intensity * (power / (angle * grey(intensity)));
+            intensity = with_luminance(intensity, power / angle);
         }
         let [from, to] = [from, to].map(|point| self.state.transform.transform_point3(point));
         let axis = (to - from).try_normalize();
@@ -203,6 +200,11 @@ impl Importer<'_> {
         let node = node.rgb("intensity", intensity).float("cutoff_angle", cone);
         Ok(node.float("beam_width", cone - delta))
     }
+}
+
+/// The colour with another luminance; black stays black.
+fn with_luminance(colour: Spectrum, luminance: f64) -> Spectrum {
+    if colour.is_black() { colour } else { colour * (luminance / grey(colour)) }
 }
 
 /// From Mitsuba's environments, with +y up, to pbrt's, with +z up; the same as in [`octahedral`].

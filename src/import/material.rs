@@ -12,6 +12,9 @@ use crate::spectrum::Spectrum;
 /// Roughness below which pbrt takes a surface for smooth.
 const SMOOTH: f64 = 1e-3;
 
+/// Most elements of one material.
+const MOST_ELEMENTS: usize = 1000;
+
 const MATERIALS: [&str; 25] = [
     "diffuse",
     "coateddiffuse",
@@ -242,8 +245,14 @@ impl Importer<'_> {
         let [first, second] = &names[..] else {
             return Err(params.spot.error(format!("found {} materials in a mix; expected 2", names.len())));
         };
+        // Each use is a copy: mixes of mixes of mixes would grow without bound.
+        if first.node.count() + second.node.count() > MOST_ELEMENTS {
+            let message =
+                format!("found a mix of more than {MOST_ELEMENTS} elements; expected fewer mixes inside mixes");
+            return Err(params.spot.error(message));
+        }
         let amount = self.texture(params, "amount", 0.5)?;
-        self.check_factor(&amount, &params.spot);
+        let amount = self.baked(amount, &params.spot);
         let transmissive = [first, second].iter().any(|material| material.transmissive || material.opacity.is_some());
         let side = |material: &Material| if transmissive { material.sides() } else { material.node.clone() };
         let node = Node::new("bsdf", "blendbsdf").child(amount.float_node("weight"));
@@ -260,7 +269,7 @@ impl Importer<'_> {
         }
         for name in ["displacement", "bumpmap"] {
             let Some(texture) = self.maybe_texture(params, name)? else { continue };
-            let scale = texture.lost_factor().map_or(1.0, grey);
+            let scale = texture.image_factor().map_or(1.0, grey);
             // A constant height changes nothing.
             if texture.constant().is_none() {
                 let bump = Node::new("bsdf", "bumpmap").child(texture.float_node("arbitrary"));
@@ -278,7 +287,7 @@ impl Importer<'_> {
     /// The parameter `name`, whose values are shares of light; `None` where it is not given.
     pub(super) fn maybe_share(&mut self, params: &mut Params, name: &str) -> Result<Option<Texture>, LoadError> {
         let Some(texture) = self.maybe_texture(params, name)? else { return Ok(None) };
-        self.check_factor(&texture, &params.spot);
+        let texture = self.baked(texture, &params.spot);
         Ok(Some(match texture.constant() {
             Some(colour) if colour.max_element() > 1.0 => {
                 self.report.approximated(&params.spot, format!("`{name}` above 1: 1"));

@@ -7,6 +7,7 @@
 mod camera;
 mod coated;
 mod colour;
+mod gzip;
 mod interpret;
 mod light;
 mod material;
@@ -18,6 +19,7 @@ mod ply;
 mod quadric;
 mod render;
 mod report;
+mod scaled;
 mod shape;
 mod source;
 mod state;
@@ -93,6 +95,8 @@ struct Importer<'o> {
     stack: Vec<(Opened, State)>,
     spaces: HashMap<String, DAffine3>,
     textures: HashMap<String, Texture>,
+    /// Images that were multiplied, by file, factor, and whether their values are linear.
+    scaled: HashMap<(String, [u64; 3], bool), String>,
     materials: Vec<Material>,
     /// Indices of materials by their names.
     named: HashMap<String, usize>,
@@ -143,6 +147,7 @@ impl<'o> Importer<'o> {
             stack: Vec::new(),
             spaces: HashMap::from([("world".to_owned(), DAffine3::IDENTITY)]),
             textures: HashMap::new(),
+            scaled: HashMap::new(),
             materials: Vec::new(),
             named: HashMap::new(),
             render: render::Render::default(),

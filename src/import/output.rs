@@ -1,7 +1,7 @@
 //! The files of the result. They are made in a folder of their own and moved to their places when all is done.
 
 use super::ImportError;
-use crate::image::{Image, WriteOptions, write_whole};
+use crate::image::{Image, Precision, WriteOptions, write_whole};
 use std::io::Write as _;
 use std::path::{Component, Path, PathBuf};
 use tempfile::TempDir;
@@ -49,9 +49,10 @@ impl Output {
     }
 
     /// Adds an image; its path relative to the scene.
-    pub fn image(&mut self, image: &Image) -> Result<String, String> {
+    pub fn image(&mut self, image: &Image, precision: Precision) -> Result<String, String> {
         let name = self.next_name("exr");
-        let written = image.write(&self.staging.path().join(&name), &WriteOptions::default());
+        let options = WriteOptions { precision, ..WriteOptions::default() };
+        let written = image.write(&self.staging.path().join(&name), &options);
         written.map_err(|error| format!("cannot write {FOLDER}/{name}: {error}"))?;
         Ok(format!("{FOLDER}/{name}"))
     }

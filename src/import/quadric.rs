@@ -64,9 +64,11 @@ impl Profile {
                 mesh.triangles.extend([[a, b, d + 1], [a, d + 1, d]]);
             }
         }
+        // Triangles at the poles have two corners in the same place, but for rounding.
+        let size = mesh.positions.iter().map(|p| p.length_squared()).fold(0.0, f64::max);
         mesh.triangles.retain(|triangle| {
             let [a, b, c] = triangle.map(|i| mesh.positions[i as usize]);
-            (b - a).cross(c - a).length_squared() > 0.0
+            (b - a).cross(c - a).length() > 1e-12 * size
         });
         mesh
     }

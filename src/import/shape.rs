@@ -1,6 +1,7 @@
 //! Shapes and groups of them.
 
 use super::Importer;
+use super::gzip;
 use super::material::Material;
 use super::mesh::Mesh;
 use super::params::Params;
@@ -226,22 +227,23 @@ impl Importer<'_> {
         };
         let path = self.find(&file)?;
         let bytes = std::fs::read(&path).map_err(|error| file.error_at(0, &format!("a file to read ({error})")))?;
-        let read = ply::read(&bytes).map_err(|reason| file.error_at(0, &format!("a whole mesh ({reason})")))?;
+        let packed = bytes.len();
+        let read = gzip::unpack(bytes).and_then(|bytes| Ok((bytes.len(), ply::read(&bytes)?)));
+        let (size, read) = read.map_err(|reason| file.error_at(0, &format!("a whole mesh ({reason})")))?;
         if params.any("displacement").is_some() {
             self.report.left_out(&params.spot, "the displacement of a plymesh");
         }
-        if !read.triangles_only {
+        let space = self.state.transform;
+        let flat = read.mesh.normals.is_empty();
+        // Normals of the file keep their side when mirrored; faces do not. Mitsuba 3.9 merges meshes without looking at
+        // `flip_normals`, and fails: those are written anew.
+        let turned = self.state.reversed != (flat && mirrors(&space));
+        if turned || packed != size || !read.triangles_only {
             return self.mesh(read.mesh, &params.spot, false);
         }
-        let space = self.state.transform;
         let mut node = Node::new("shape", "ply").string("filename", self.resource(&file)?).placed(&space);
-        let flat = read.mesh.normals.is_empty();
         if flat {
             node = node.boolean("face_normals", true);
-        }
-        // Normals of the file keep their side when mirrored; faces do not.
-        if self.state.reversed != (flat && mirrors(&space)) {
-            node = node.boolean("flip_normals", true);
         }
         if textured && !read.mesh.uvs.is_empty() {
             node = node.boolean("flip_tex_coords", true);

@@ -1,5 +1,6 @@
 //! The text of a pbrt file, and places in it.
 
+use super::gzip;
 use crate::load::{LoadError, Place};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -15,9 +16,7 @@ impl Source {
     /// Reads the file at `path`. Bytes that are not UTF-8, such as names in comments, become replacement characters.
     pub fn read(path: &Path) -> Result<Rc<Self>, String> {
         let bytes = std::fs::read(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
-        if bytes.starts_with(&[0x1f, 0x8b]) {
-            return Err(format!("{} is compressed; expected text (unpack it with gunzip first)", path.display()));
-        }
+        let bytes = gzip::unpack(bytes).map_err(|reason| format!("cannot read {}: {reason}", path.display()))?;
         let text = match String::from_utf8(bytes) {
             Ok(text) => text,
             Err(error) => String::from_utf8_lossy(error.as_bytes()).into_owned(),

@@ -3,16 +3,19 @@
 use super::Importer;
 use super::colour::{self, Role};
 use super::params::{COLOURS, Param, Params};
-use super::source::Spot;
 use super::xml::{Node, rgb};
 use crate::load::LoadError;
 use crate::spectrum::Spectrum;
 use glam::DVec2;
+use std::path::PathBuf;
 
 /// Classes that are understood.
 const CLASSES: [&str; 5] = ["constant", "scale", "mix", "checkerboard", "imagemap"];
 
-/// Classes whose value in the middle of their range stands in for them: what of them is not known is grey.
+/// Most textures in one: each use is a copy.
+const MOST: usize = 100;
+
+/// The value that stands in for classes that are not known.
 const GREY: f64 = 0.5;
 
 /// A value that may vary over a surface.
@@ -21,7 +24,14 @@ pub(super) enum Texture {
     Constant(Spectrum),
     /// An image and the factor on its values. Mitsuba has no such factor.
     Image {
+        /// The texture without its file.
         node: Node,
+        /// The file, relative to the result.
+        file: String,
+        /// Where the file is.
+        source: PathBuf,
+        /// Whether its values are linear.
+        linear: bool,
         factor: Spectrum,
     },
     Checker {
@@ -48,7 +58,9 @@ impl Texture {
     fn times(self, factor: Spectrum) -> Self {
         match self {
             Self::Constant(value) => Self::Constant(value * factor),
-            Self::Image { node, factor: before } => Self::Image { node, factor: before * factor },
+            Self::Image { node, file, source, linear, factor: before } => {
+                Self::Image { node, file, source, linear, factor: before * factor }
+            }
             Self::Checker { sides, to_uv } => {
                 let [a, b] = *sides;
                 Self::Checker { sides: Box::new([a.times(factor), b.times(factor)]), to_uv }
@@ -56,12 +68,20 @@ impl Texture {
         }
     }
 
-    /// The factor that an image lacks in the result.
-    pub fn lost_factor(&self) -> Option<Spectrum> {
+    /// How many textures there are in it.
+    fn count(&self) -> usize {
+        match self {
+            Self::Checker { sides, .. } => sides[0].count() + sides[1].count(),
+            _ => 1,
+        }
+    }
+
+    /// The factor of an image, where it has one.
+    pub fn image_factor(&self) -> Option<Spectrum> {
         match self {
             Self::Constant(_) => None,
             Self::Image { factor, .. } => Some(*factor).filter(|factor| *factor != Spectrum::ONE),
-            Self::Checker { sides, .. } => sides.iter().find_map(Self::lost_factor),
+            Self::Checker { sides, .. } => sides.iter().find_map(Self::image_factor),
         }
     }
 
@@ -69,7 +89,7 @@ impl Texture {
     pub fn node(&self, name: &str) -> Node {
         match self {
             Self::Constant(value) => rgb(name, *value),
-            Self::Image { node, .. } => node.clone().named(name),
+            Self::Image { node, file, .. } => node.clone().string("filename", file).named(name),
             Self::Checker { sides, to_uv } => {
                 let node = Node::new("texture", "checkerboard").named(name);
                 node.child(sides[0].node("color0")).child(sides[1].node("color1")).child(to_uv.clone())
@@ -178,7 +198,13 @@ impl Importer<'_> {
             self.report.approximated(&params.spot, "a checkerboard in space: one in texture coordinates");
         }
         params.ignore(&["aamode"]);
-        let sides = Box::new([self.texture(params, "tex1", 1.0)?, self.texture(params, "tex2", 0.0)?]);
+        let sides = [self.texture(params, "tex1", 1.0)?, self.texture(params, "tex2", 0.0)?];
+        if sides.iter().map(Texture::count).sum::<usize>() > MOST {
+            let message =
+                format!("found a checkerboard of more than {MOST} textures; expected fewer inside each other");
+            return Err(params.spot.error(message));
+        }
+        let sides = Box::new(sides);
         // Mitsuba's pattern has two fields per unit.
         let to_uv = self.mapping(params, 0.5)?.unwrap_or_else(|| uv_node(DVec2::splat(0.5), DVec2::ZERO));
         Ok(Texture::Checker { sides, to_uv })
@@ -188,8 +214,9 @@ impl Importer<'_> {
         let Some(file) = params.take("filename", &["string"])? else {
             return Err(params.spot.error("an imagemap lacks the parameter `filename`"));
         };
-        let path = self.resource(&file)?;
-        let mut node = Node::new("texture", "bitmap").string("filename", path);
+        let source = self.find(&file)?;
+        let file = self.resource(&file)?;
+        let mut node = Node::new("texture", "bitmap");
         let wrap = params.string("wrap")?.unwrap_or("repeat".to_owned());
         match wrap.as_str() {
             "repeat" => (),
@@ -204,7 +231,8 @@ impl Importer<'_> {
             node = node.string("filter_type", "nearest");
         }
         params.ignore(&["maxanisotropy", "trilinear"]);
-        if self.is_linear(params)? {
+        let linear = self.is_linear(params)?;
+        if linear {
             node = node.boolean("raw", true);
         }
         if params.boolean("invert")? == Some(true) {
@@ -212,7 +240,7 @@ impl Importer<'_> {
         }
         let factor = params.float("scale")?.unwrap_or(1.0);
         node = node.maybe(self.mapping(params, 1.0)?);
-        Ok(Texture::Image { node, factor: Spectrum::grey(factor) })
+        Ok(Texture::Image { node, file, source, linear, factor: Spectrum::grey(factor) })
     }
 
     /// Whether the image's bytes are the values themselves.
@@ -242,14 +270,6 @@ impl Importer<'_> {
             return Ok(None);
         }
         Ok(Some(uv_node(scale * period, shift * period)))
-    }
-
-    /// Reports the factor that an image loses.
-    pub(super) fn check_factor(&mut self, texture: &Texture, spot: &Spot) {
-        if let Some(factor) = texture.lost_factor() {
-            let [r, g, b] = factor.to_rgb();
-            self.report.left_out(spot, format!("the factor {r} {g} {b} on the values of an image"));
-        }
     }
 }
 

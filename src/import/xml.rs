@@ -111,6 +111,11 @@ impl Node {
         self.tag == tag || self.children.iter().any(|child| child.contains(tag))
     }
 
+    /// How many elements there are in all.
+    pub fn count(&self) -> usize {
+        self.children.iter().map(Node::count).sum::<usize>() + 1
+    }
+
     /// The element as text, indented `depth` times.
     pub fn write(&self, depth: usize, out: &mut String) {
         let indent = "    ".repeat(depth);
