@@ -122,7 +122,7 @@ fn trace(
             direct(scene, &surface, wi, &state, true, stream, pixel, band);
         }
         let row = stream.row();
-        let Some(scatter) = bsdf.sample(surface.uv, wi, row, Walk::FromCamera) else { return };
+        let Some(scatter) = scene.scatter(&surface, wi, row, Walk::FromCamera) else { return };
         let mut weight = scatter.weight;
         alive *= weight.max_element() * scatter.eta * scatter.eta;
         if depth >= ROULETTE_FROM {
@@ -178,7 +178,7 @@ pub(super) fn direct(
 ) {
     let Some(light) = sample_direct(scene, surface.position, stream.row()) else { return };
     let wo = surface.frame.to_local(light.direction);
-    let Some(scattered) = scene.bsdf(surface.bsdf).evaluate(surface.uv, wi, wo, Walk::FromCamera) else { return };
+    let Some(scattered) = scene.evaluate(surface, wi, wo, Walk::FromCamera) else { return };
     if !light.arrives(scene, surface.leave(light.direction)) {
         return;
     }

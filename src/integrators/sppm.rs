@@ -154,7 +154,7 @@ impl Sppm {
                     return;
                 }
             }
-            let Some(scatter) = bsdf.sample(surface.uv, wi, stream.row(), Walk::FromCamera) else { return };
+            let Some(scatter) = scene.scatter(&surface, wi, stream.row(), Walk::FromCamera) else { return };
             if gathered && !scatter.delta {
                 return;
             }
@@ -191,7 +191,6 @@ impl Sppm {
     fn gather(&self, scene: &Scene, grids: &Grids, gather: &Gather, band: &mut Band) {
         let Gather { surface, radius, .. } = gather;
         let wi = surface.frame.to_local(gather.back);
-        let bsdf = scene.bsdf(surface.bsdf);
         let scale = gather.throughput / (PI * radius * radius);
         grids.within(surface.position, *radius, |photon| {
             let height = (photon.position - surface.position).dot(surface.geometric).abs();
@@ -199,7 +198,7 @@ impl Sppm {
                 return;
             }
             let wo = surface.frame.to_local(photon.back);
-            let Some(scattered) = bsdf.evaluate(surface.uv, wi, wo, Walk::FromCamera) else { return };
+            let Some(scattered) = scene.evaluate(surface, wi, wo, Walk::FromCamera) else { return };
             // Photons arrive per true area, scattering counts area seen along the shading normal.
             let geometric = photon.back.dot(surface.geometric).abs();
             let correction = if geometric > 0.0 { wo.z.abs() / geometric } else { 0.0 };

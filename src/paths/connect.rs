@@ -106,8 +106,7 @@ fn end_of(scene: &Caster<'_>, vertices: &[Vertex], direction: DVec3, walk: Walk)
         }
         VertexKind::Surface(surface) => {
             let (wi, wo) = (surface.frame.to_local(end.back), surface.frame.to_local(direction));
-            let Evaluation { value, pdf, pdf_reverse, letter } =
-                scene.bsdf(surface.bsdf).evaluate(surface.uv, wi, wo, walk)?;
+            let Evaluation { value, pdf, pdf_reverse, letter } = scene.evaluate(surface, wi, wo, walk)?;
             let correction = shading_correction(surface, end.back, direction, walk);
             let previous = &vertices[vertices.len() - 2];
             let word = match walk {

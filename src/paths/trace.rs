@@ -141,7 +141,7 @@ fn walk(
         }
         let row = rows.row(last + 1 + row_shift);
         let wi = surface.frame.to_local(vertex.back);
-        let Some(scatter) = scene.bsdf(surface.bsdf).sample(surface.uv, wi, row, mode) else { return };
+        let Some(scatter) = scene.scatter(&surface, wi, row, mode) else { return };
         let direction = surface.frame.to_world(scatter.direction);
         let mut weight = scatter.weight * shading_correction(&surface, vertex.back, direction, mode);
         // What remains of the walk's power; radiance that was squeezed by refraction is no loss.

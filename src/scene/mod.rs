@@ -9,11 +9,11 @@ pub use builder::{Builder, FilmSpec, Mesh, SceneError, Shine};
 pub use caster::{Caster, Origin};
 pub use surface::Surface;
 
-use crate::bsdf::Bsdf;
+use crate::bsdf::{Bsdf, Evaluation, Scatter};
 use crate::camera::Camera;
 use crate::emitter::{Emitter, Start};
 use crate::geometry::{Bvh, NO_TRIANGLE, Primitive, Ray, Solid, SurfacePoint};
-use crate::math::{AreaPdf, Discrete, Frame, Row};
+use crate::math::{AreaPdf, Discrete, Frame, Row, Walk};
 use crate::texture::Relief;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
@@ -105,7 +105,7 @@ impl Scene {
             (normal, normal)
         };
         let Shape { bsdf, emitter, textured, oriented, mapped } = self.shapes[self.triangle_shapes[index] as usize];
-        let (mut uv, mut frame) = (DVec2::ZERO, Frame::around(shading));
+        let (mut uv, mut frame, mut up) = (DVec2::ZERO, Frame::around(shading), DVec3::Z);
         if textured {
             // Without texture coordinates, barycentric ones stand in, as in Mitsuba.
             let uvs = match mapped {
@@ -114,19 +114,22 @@ impl Scene {
             };
             uv = uvs[0] * w + uvs[1] * u + uvs[2] * v;
             if oriented {
-                frame = self.orient(shading, bsdf, uv, relief::derivatives([a, b, c], uvs, normal));
+                (frame, up) = self.orient(shading, bsdf, uv, relief::derivatives([a, b, c], uvs, normal));
             }
         }
         let (position, triangle) = (a * w + b * u + c * v, index as u32);
-        Surface { position, geometric, frame, uv, bsdf, emitter, offset, triangle }
+        Surface { position, geometric, frame, up, uv, bsdf, emitter, offset, triangle }
     }
 
-    /// The shading frame where it has to follow the texture coordinates.
-    fn orient(&self, normal: DVec3, bsdf: BsdfId, uv: DVec2, derivatives: [DVec3; 2]) -> Frame {
+    /// The shading frame where it has to follow the texture coordinates, and `normal` in it.
+    fn orient(&self, normal: DVec3, bsdf: BsdfId, uv: DVec2, derivatives: [DVec3; 2]) -> (Frame, DVec3) {
         let frame = relief::oriented(normal, derivatives[0]);
         match &self.reliefs[bsdf.0 as usize] {
-            Some(relief) => relief::tilted(frame, relief, uv, derivatives),
-            None => frame,
+            Some(relief) => {
+                let tilted = relief::tilted(frame, relief, uv, derivatives);
+                (tilted, tilted.to_local(normal))
+            }
+            None => (frame, DVec3::Z),
         }
     }
 
@@ -134,15 +137,33 @@ impl Scene {
     fn solid_surface(&self, index: usize, near: DVec3) -> Surface {
         let SurfacePoint { position, normal, offset, .. } = self.solids[index].surface_point(near);
         let Shape { bsdf, emitter, textured, oriented, .. } = self.shapes[self.solid_shapes[index] as usize];
-        let (mut uv, mut frame) = (DVec2::ZERO, Frame::around(normal));
+        let (mut uv, mut frame, mut up) = (DVec2::ZERO, Frame::around(normal), DVec3::Z);
         if textured {
             let chart = self.solids[index].chart(position);
             uv = chart.uv;
             if oriented {
-                frame = self.orient(normal, bsdf, uv, chart.derivatives);
+                (frame, up) = self.orient(normal, bsdf, uv, chart.derivatives);
             }
         }
-        Surface { position, geometric: normal, frame, uv, bsdf, emitter, offset, triangle: NO_TRIANGLE }
+        Surface { position, geometric: normal, frame, up, uv, bsdf, emitter, offset, triangle: NO_TRIANGLE }
+    }
+
+    /// What scattering from `wi` to `wo` at a surface amounts to; see [`Bsdf::evaluate`].
+    #[inline]
+    pub fn evaluate(&self, at: &Surface, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
+        if !(at.admits(wi) && at.admits(wo)) {
+            return None;
+        }
+        self.bsdf(at.bsdf).evaluate(at.uv, wi, wo, walk)
+    }
+
+    /// Samples a direction in which a surface scatters; see [`Bsdf::sample`].
+    #[inline]
+    pub fn scatter(&self, at: &Surface, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
+        if !at.admits(wi) {
+            return None;
+        }
+        self.bsdf(at.bsdf).sample(at.uv, wi, row, walk).filter(|scatter| at.admits(scatter.direction))
     }
 
     /// The scattering model `id`.
