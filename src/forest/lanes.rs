@@ -111,7 +111,8 @@ impl Walk {
         std::array::from_fn(|lane| {
             let here = self.steps[at[lane] as usize];
             let value = values.get(here.plane as usize + lane).copied().unwrap_or(0.0);
-            here.below.wrapping_add(u32::from(!(value < here.threshold)))
+            // What does not compare lies above: so do the leaves, whose threshold is not a number.
+            here.below.wrapping_add(1 - u32::from(value < here.threshold))
         })
     }
 }

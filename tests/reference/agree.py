@@ -26,6 +26,17 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 
 
+def film(match):
+    """A film with nothing but what decides the image."""
+    kept = re.findall(r'<integer name="(?:width|height)"[^>]*/>|<rfilter\b[^>]*/>', match.group(0))
+    return '<film type="hdrfilm">' + "".join(kept) + "</film>"
+
+
+def sun_aperture(match):
+    """Mitsuba 3 has the sun's angle across in degrees, Mitsuba 0.6 a factor on its radius."""
+    return f'<float name="sun_aperture" value="{0.5358 * float(match.group(1))}"/>'
+
+
 def upgrade(text):
     """The scene as Mitsuba 3 takes it, and what was changed about it."""
     notes = []
@@ -42,8 +53,11 @@ def upgrade(text):
     edit(r'<sampler\b[^>]*/>', "", None)
     edit(r'<sampler\b.*?</sampler>', "", None)
     edit(r'<film type="ldrfilm"', '<film type="hdrfilm"', None)
-    edit(r'<(?:boolean|string|float) name="(?:attachLog|gamma|pixelFormat|fileFormat|componentFormat|filename)"[^>]*/>(?=(?:(?!<film).)*</film>)', "", None)
+    text = re.sub(r"<film\b.*?</film>", film, text, flags=re.S)
     edit(r'<float name="samplingWeight"[^>]*/>', "", None)
+    edit(r'<(?:string|float) name="extEta"[^>]*/>', "", "extEta dropped")
+    edit(r'<float name="uvscale" value="([^"]*)"\s*/>', r'<transform name="to_uv"><scale x="\1" y="\1"/></transform>', None)
+    edit(r'<(?:float|integer) name="sunRadiusScale" value="([^"]*)"\s*/>', sun_aperture, None)
     edit(r'"trilinear"', '"bilinear"', None)
     edit(r'"ewa"', '"bilinear"', None)
     edit(r'<spectrum( name="[^"]*") value="([^":]*)"\s*/>', r'<rgb\1 value="\2"/>', None)
