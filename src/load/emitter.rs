@@ -3,7 +3,7 @@
 use super::document::Element;
 use super::error::LoadError;
 use super::plugin::Plugin;
-use crate::emitter::sky::{SUN_DIAMETER, Sky, When};
+use crate::emitter::sky::{SUN_DIAMETER, Sky, SunModel, When};
 use crate::emitter::{Backdrop, Panorama, Spot};
 use crate::scene::Shine;
 use glam::{DAffine3, DMat3, DVec3};
@@ -15,8 +15,9 @@ const KINDS: [&str; 9] =
 /// files are rounded.
 const SKEW_TOLERANCE: f64 = 1e-3;
 
-/// Parameters that cannot change the image, or hardly: how finely Mitsuba 0.6 draws the sky.
-const HARMLESS: [&str; 5] = ["sampling_weight", "resolution", "cache", "sun_samples", "id"];
+/// Parameters that cannot change the image, or hardly: how finely Mitsuba 0.6 draws the sky, and whether Mitsuba 3's sun
+/// is darker at its rim.
+const HARMLESS: [&str; 6] = ["sampling_weight", "resolution", "cache", "sun_samples", "complex_sun", "id"];
 
 /// Reads an emitter that is not a shape; a sun as a point gives two.
 pub(super) fn read(element: Element<'_>) -> Result<Vec<Shine>, LoadError> {
@@ -36,12 +37,6 @@ pub(super) fn read(element: Element<'_>) -> Result<Vec<Shine>, LoadError> {
     };
     plugin.finish()?;
     Ok(shines)
-}
-
-/// What the user should know about an emitter that has been read.
-pub(super) fn caveat(element: Element<'_>) -> Option<String> {
-    let newer = ["sunsky", "sun"].contains(&element.attribute("type")?.text) && !element.is_legacy();
-    newer.then(|| element.warning("the sun here is that of Mitsuba 0.6, up to 30 % darker than Mitsuba 3's"))
 }
 
 fn point(plugin: &mut Plugin<'_>) -> Result<Shine, LoadError> {
@@ -130,6 +125,7 @@ fn sun_and_sky(plugin: &mut Plugin<'_>) -> Result<Vec<Shine>, LoadError> {
         turbidity: turbidity.unwrap_or(3.0),
         albedo: plugin.share("albedo", if plugin.element.is_legacy() { 0.2 } else { 0.3 })?,
         stretch: stretch.unwrap_or(1.0),
+        sun_model: if plugin.element.is_legacy() { SunModel::Preetham } else { SunModel::Hosek },
     };
     let whole = scale(plugin, "scale", 1.0)?;
     let mut shines = Vec::new();

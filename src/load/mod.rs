@@ -157,7 +157,6 @@ impl Reader {
             "bsdf" => bsdf::read(element).map(drop),
             "texture" => texture::read(element).map(drop),
             "emitter" => {
-                self.warnings.extend(emitter::caveat(element));
                 let add = |shine| self.builder.emitter(shine).map_err(|error| element.error(error.to_string()));
                 emitter::read(element)?.into_iter().try_for_each(add)
             }

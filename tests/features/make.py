@@ -145,6 +145,8 @@ SCENES = {
     "bitmap_on_cube": placed("cube", bsdf=bsdf("diffuse", COLOURS)),
     # Emitters.
     "area_textured": scene(BALL.format(GREY), light=LAMP.replace(rgb("radiance", "4, 4.5, 5"), bitmap("radiance", "colours.png", flag("raw")))),
+    "sunsky": scene(BALL.format(bsdf("roughconductor", number("alpha", 0.2))), light=emitter("sunsky", number("turbidity", 4), number("sun_aperture", 10), number("sun_scale", 0.5), number("sky_scale", 3), '<vector name="sun_direction" x="1" y="1.5" z="0.7"/>', '<transform name="to_world"><rotate x="1" angle="-90"/></transform>')),
+    "sunsky_by_time": scene(BALL.format(bsdf("diffuse")), light=emitter("sunsky", *(number(name, value) for name, value in (("hour", 10), ("latitude", 48.2), ("longitude", 16.4), ("timezone", 2), ("sun_aperture", 20))), '<transform name="to_world"><rotate x="1" angle="-90"/><rotate y="1" angle="30"/></transform>')),
     "envmap": scene(BALL.format(bsdf("roughconductor", number("alpha", 0.2))), light=emitter("envmap", string("filename", "sky.exr"), number("scale", 1.5), '<transform name="to_world"><rotate y="1" angle="40"/></transform>')),
     "point": scene(BALL.format(GREY), light=emitter("point", '<point name="position" x="1" y="3" z="2"/>', rgb("intensity", "9, 10, 11"))),
     "spot": scene(BALL.format(GREY), light=emitter("spot", rgb("intensity", "30"), number("cutoff_angle", 25), number("beam_width", 15), '<transform name="to_world"><lookat origin="1, 4, 2" target="0, 0.4, 0" up="0, 0, 1"/></transform>')),

@@ -14,12 +14,9 @@ const COEFFICIENTS: usize = 9;
 /// Entries for one channel of a table with one number for each control point.
 const STATES: usize = 2 * TURBIDITIES * CONTROLS;
 /// Integral of the eye's response over wavelength in nm, by which Mitsuba 3 divides; 0.6 divides by 106.857.
-const RESPONSE: f64 = 106.750_259;
+pub(super) const RESPONSE: f64 = 106.750_259;
 
-static TABLE: LazyLock<Vec<f64>> = LazyLock::new(|| {
-    let bytes = include_bytes!("hosek_wilkie_rgb.f32").as_chunks::<4>().0;
-    bytes.iter().map(|bytes| f64::from(f32::from_le_bytes(*bytes))).collect()
-});
+static TABLE: LazyLock<Vec<f64>> = LazyLock::new(|| super::numbers(include_bytes!("hosek_wilkie_rgb.f32")));
 
 /// The sky for one place of the sun.
 pub(super) struct Dome {
