@@ -118,7 +118,7 @@ fn trace(
         }
         let wi = surface.frame.to_local(-state.direction);
         let bsdf = scene.bsdf(surface.bsdf);
-        if !bsdf.is_delta(wi) {
+        if !bsdf.is_delta(scene.met(&surface, wi)) {
             direct(scene, &surface, wi, &state, true, stream, pixel, band);
         }
         let row = stream.row();

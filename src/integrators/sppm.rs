@@ -136,8 +136,9 @@ impl Sppm {
             }
             let wi = surface.frame.to_local(-state.direction);
             let bsdf = scene.bsdf(surface.bsdf);
-            let gathered = bsdf.gathers(wi);
-            if !bsdf.is_delta(wi) {
+            let met = scene.met(&surface, wi);
+            let gathered = bsdf.gathers(met);
+            if !bsdf.is_delta(met) {
                 path::direct(scene, &surface, wi, &state, !gathered, stream, pixel, band);
             }
             if gathered {
@@ -150,7 +151,7 @@ impl Sppm {
                     radius: radius_per_distance * distance,
                     pixel,
                 });
-                if !bsdf.has_delta(wi) {
+                if !bsdf.has_delta(met) {
                     return;
                 }
             }
@@ -174,7 +175,8 @@ impl Sppm {
             // The first surface receives direct light, which the walks from the camera account for.
             for (edges, vertex) in path.vertices.iter().enumerate().skip(2) {
                 let VertexKind::Surface(surface) = &vertex.kind else { continue };
-                if scene.bsdf(surface.bsdf).gathers(surface.frame.to_local(vertex.back)) {
+                let met = scene.met(surface, surface.frame.to_local(vertex.back));
+                if scene.bsdf(surface.bsdf).gathers(met) {
                     photons.push(Photon {
                         position: vertex.position,
                         back: vertex.back,

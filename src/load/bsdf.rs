@@ -14,7 +14,7 @@ use crate::bsdf::{
     RoughDielectric, RoughPlastic, ThinDielectric,
 };
 use crate::spectrum::Spectrum;
-use crate::texture::{Colour, Relief};
+use crate::texture::{Colour, Relief, ReliefMap};
 
 const KINDS: [&str; 18] = [
     "diffuse",
@@ -184,10 +184,15 @@ impl Reader {
             None => plugin.any_texture()?,
         };
         let texture = texture.ok_or_else(|| plugin.lacks(name))?;
-        self.relief = Some(if bump {
-            Relief::Bump { texture, scale: plugin.float("scale")?.map_or(1.0, |scale| scale.value) }
+        let map = if bump {
+            ReliefMap::Bump { texture, scale: plugin.float("scale")?.map_or(1.0, |scale| scale.value) }
         } else {
-            Relief::Normal { texture }
+            ReliefMap::Normal { texture }
+        };
+        self.relief = Some(Relief {
+            map,
+            mirrors: plugin.boolean_or("flip_invalid_normals", true)?,
+            shadows: plugin.boolean_or("use_shadowing_function", true)?,
         });
         self.one(plugin)
     }

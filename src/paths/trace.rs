@@ -195,6 +195,7 @@ fn surface_vertex(scene: &Caster<'_>, surface: &Surface, walker: &Walker, previo
         VertexKind::Light(id, start) => scene.emitter(*id).emit_pdf(start, walker.direction, cos, distance_squared),
         _ => walker.pdf.to_area(cos, distance_squared),
     };
+    let met = scene.met(surface, surface.frame.to_local(-walker.direction));
     Vertex {
         kind: VertexKind::Surface(*surface),
         position: surface.position,
@@ -202,7 +203,7 @@ fn surface_vertex(scene: &Caster<'_>, surface: &Surface, walker: &Walker, previo
         throughput: walker.throughput,
         forward,
         reverse: AreaPdf(0.0),
-        connects: !scene.bsdf(surface.bsdf).is_delta(surface.frame.to_local(-walker.direction)),
+        connects: !scene.bsdf(surface.bsdf).is_delta(met),
         delta: false,
         word: walker.word,
     }

@@ -4,16 +4,17 @@ mod builder;
 mod caster;
 mod relief;
 mod surface;
+mod tilted;
 
 pub use builder::{Builder, FilmSpec, Mesh, SceneError, Shine};
 pub use caster::{Caster, Origin};
 pub use surface::Surface;
 
-use crate::bsdf::{Bsdf, Evaluation, Scatter};
+use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::emitter::{Emitter, Start};
 use crate::geometry::{Bvh, NO_TRIANGLE, Primitive, Ray, Solid, SurfacePoint};
-use crate::math::{AreaPdf, Discrete, Frame, Row, Walk};
+use crate::math::{AreaPdf, Discrete, Frame, Row};
 use crate::texture::Relief;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
@@ -126,7 +127,7 @@ impl Scene {
         let frame = relief::oriented(normal, derivatives[0]);
         match &self.reliefs[bsdf.0 as usize] {
             Some(relief) => {
-                let tilted = relief::tilted(frame, relief, uv, derivatives);
+                let tilted = relief::tilted(frame, &relief.map, uv, derivatives);
                 (tilted, tilted.to_local(normal))
             }
             None => (frame, DVec3::Z),
@@ -146,24 +147,6 @@ impl Scene {
             }
         }
         Surface { position, geometric: normal, frame, up, uv, bsdf, emitter, offset, triangle: NO_TRIANGLE }
-    }
-
-    /// What scattering from `wi` to `wo` at a surface amounts to; see [`Bsdf::evaluate`].
-    #[inline]
-    pub fn evaluate(&self, at: &Surface, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
-        if !(at.admits(wi) && at.admits(wo)) {
-            return None;
-        }
-        self.bsdf(at.bsdf).evaluate(at.uv, wi, wo, walk)
-    }
-
-    /// Samples a direction in which a surface scatters; see [`Bsdf::sample`].
-    #[inline]
-    pub fn scatter(&self, at: &Surface, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
-        if !at.admits(wi) {
-            return None;
-        }
-        self.bsdf(at.bsdf).sample(at.uv, wi, row, walk).filter(|scatter| at.admits(scatter.direction))
     }
 
     /// The scattering model `id`.

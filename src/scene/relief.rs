@@ -1,7 +1,7 @@
 //! Shading frames that textures tilt: bump maps (Blinn 1978) and normal maps.
 
 use crate::math::Frame;
-use crate::texture::{Relief, Texture};
+use crate::texture::{ReliefMap, Texture};
 use glam::{DVec2, DVec3};
 
 /// Step of the differences that slopes are taken from: far below the size of a texel, far above rounding.
@@ -16,11 +16,11 @@ pub(super) fn oriented(normal: DVec3, along: DVec3) -> Frame {
     }
 }
 
-/// The frame as `relief` tilts it at `uv`; `derivatives` are those of the position by u and v.
-pub(super) fn tilted(frame: Frame, relief: &Relief, uv: DVec2, derivatives: [DVec3; 2]) -> Frame {
+/// The frame as `map` tilts it at `uv`; `derivatives` are those of the position by u and v.
+pub(super) fn tilted(frame: Frame, map: &ReliefMap, uv: DVec2, derivatives: [DVec3; 2]) -> Frame {
     let normal = frame.normal;
-    match relief {
-        Relief::Bump { texture, scale } => {
+    match map {
+        ReliefMap::Bump { texture, scale } => {
             let slopes = slopes(texture, uv) * *scale;
             let [along_u, along_v] = derivatives;
             let along_u = along_u + normal * (slopes.x - normal.dot(along_u));
@@ -28,7 +28,7 @@ pub(super) fn tilted(frame: Frame, relief: &Relief, uv: DVec2, derivatives: [DVe
             let Some(tilted) = along_u.cross(along_v).try_normalize() else { return frame };
             oriented(if tilted.dot(normal) < 0.0 { -tilted } else { tilted }, along_u)
         }
-        Relief::Normal { texture } => {
+        ReliefMap::Normal { texture } => {
             let [x, y, z] = texture.colour(uv).to_rgb();
             let local = DVec3::new(2.0 * x - 1.0, 2.0 * y - 1.0, 2.0 * z - 1.0);
             match frame.to_world(local).try_normalize() {
@@ -70,9 +70,9 @@ mod tests {
     #[test]
     fn a_flat_normal_map_changes_nothing() {
         let flat = Checkerboard { colours: [Spectrum::rgb(0.5, 0.5, 1.0); 2], to_uv: DAffine2::IDENTITY };
-        let relief = Relief::Normal { texture: Arc::new(Texture::Checkerboard(flat)) };
+        let map = ReliefMap::Normal { texture: Arc::new(Texture::Checkerboard(flat)) };
         let frame = oriented(DVec3::Z, DVec3::new(3.0, 4.0, 1.0));
-        let same = tilted(frame, &relief, DVec2::new(0.2, 0.3), [DVec3::new(3.0, 4.0, 1.0), DVec3::X]);
+        let same = tilted(frame, &map, DVec2::new(0.2, 0.3), [DVec3::new(3.0, 4.0, 1.0), DVec3::X]);
         assert!((same.normal - DVec3::Z).length() < 1e-12 && (same.tangent - frame.tangent).length() < 1e-12);
         assert!((frame.tangent - DVec3::new(0.6, 0.8, 0.0)).length() < 1e-12);
     }

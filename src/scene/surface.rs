@@ -28,13 +28,6 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// Whether a direction in the shading frame is on the same side of the surface with and without its relief. Others
-    /// would pass through the surface, and carry no light, as in Mitsuba.
-    #[inline]
-    pub fn admits(&self, w: DVec3) -> bool {
-        self.up.z >= 1.0 || w.dot(self.up) * w.z > 0.0
-    }
-
     /// Where a ray starts that leaves towards `direction`: moved off the surface by more than the rounding errors of
     /// its position, on the side that the ray goes to.
     #[inline]

@@ -81,7 +81,18 @@ impl From<Spectrum> for Colour {
 
 /// A texture that perturbs the shading frame.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Relief {
+pub struct Relief {
+    /// How the texture is read.
+    pub map: ReliefMap,
+    /// Whether normals that face away from the viewer are mirrored at the surface's own normal.
+    pub mirrors: bool,
+    /// Whether light fades out towards the horizon where the normal is tilted.
+    pub shadows: bool,
+}
+
+/// What a texture says of the shading frame.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ReliefMap {
     /// Heights, the luminance of a texture times `scale`.
     Bump {
         /// The heights.
