@@ -61,6 +61,17 @@ def sunsky(match):
             f'<transform name="to_world"><rotate x="1" angle="-90"/>{inside}</transform></emitter>')
 
 
+def to_uv(match):
+    """Mitsuba 0.6 scales, then shifts; Mitsuba 3 rewrites such files the other way round."""
+    factors = dict(re.findall(r'<float\s+name\s*=\s*"([uv](?:scale|offset))"\s+value\s*=\s*"([^"]*)"\s*/>', match.group(0)))
+    if not any(name.endswith("offset") for name in factors):
+        return match.group(0)
+    rest = re.sub(r'<float\s+name\s*=\s*"[uv](?:scale|offset)"[^>]*/>', "", match.group(0))
+    transform = '<transform name="to_uv"><scale x="{}" y="{}"/><translate x="{}" y="{}"/></transform></texture>'
+    numbers = [factors.get(name, default) for name, default in (("uscale", 1), ("vscale", 1), ("uoffset", 0), ("voffset", 0))]
+    return rest.replace("</texture>", transform.format(*numbers))
+
+
 def upgrade(text):
     """The scene as Mitsuba 3 takes it, and what was changed about it."""
     notes = []
@@ -84,6 +95,7 @@ def upgrade(text):
     edit(r'<(?:float|integer) name="sunRadiusScale" value="([^"]*)"\s*/>', sun_aperture, None)
     text = re.sub(r'name="(sky|sun)Scale"', r'name="\1_scale"', text)
     edit(r'<emitter type="sunsky".*?</emitter>', sunsky, "sky turned, Mitsuba 3's sun")
+    text = re.sub(r"<texture\b[^>]*[^/]>.*?</texture>", to_uv, text, flags=re.S)
     edit(r'"trilinear"', '"bilinear"', None)
     edit(r'"ewa"', '"bilinear"', None)
     edit(r'<spectrum( name="[^"]*") value="([^":]*)"\s*/>', r'<rgb\1 value="\2"/>', None)
