@@ -11,7 +11,7 @@
 //! - textures `bitmap`, `checkerboard`, `mesh_attribute` of PLY meshes;
 //! - emitters `area`, `constant`, `envmap`, `sunsky` (also `sun`, `sky`), `point`, `spot`, `directional`;
 //! - colours as `<rgb>`, `<spectrum>` of values, pairs or a file; in old files also `<srgb>` and `<blackbody>`;
-//! - sensors `perspective`, `thinlens` with an `hdrfilm`, its crop, and the filters `box`, `tent`, `gaussian`;
+//! - sensors `perspective`, `thinlens`, `orthographic` with an `hdrfilm`, its crop, and the filters `box`, `tent`, `gaussian`;
 //! - any integrator's `max_depth` and `hide_emitters`; samplers are read over.
 
 mod attributes;

@@ -102,6 +102,15 @@ def sensor(kind, *parameters):
     {{film}}</sensor>"""
 
 
+def parallel(scale, *parameters):
+    return sensor("orthographic", *parameters).replace("<lookat", f"<scale {scale}/><lookat")
+
+
+def placed_box():
+    """What is cut open by clipping planes."""
+    return f'<shape type="cube"><transform name="to_world"><scale value="0.6"/><translate y="0.6"/></transform><bsdf type="twosided">{bsdf("diffuse", COLOURS)}</bsdf></shape>'
+
+
 def painted(bsdf):
     return placed("ply", string("filename", "painted.ply"), bsdf=bsdf)
 
@@ -111,6 +120,8 @@ UV = '<transform name="to_uv"><scale x="2.5" y="1.5"/><translate x="0.3" y="-0.2
 DIFFUSE = rgb("diffuse_reflectance", "0.3, 0.5, 0.7")
 RED, BLUE = (bsdf("diffuse", rgb("reflectance", v)) for v in ("0.7, 0.2, 0.1", "0.1, 0.2, 0.7"))
 SMALL = '<integer name="width" value="64"/><integer name="height" value="48"/>'
+CROPPED = f'<film type="hdrfilm">{SMALL}<integer name="crop_offset_x" value="16"/><integer name="crop_offset_y" value="10"/><integer name="crop_width" value="32"/><integer name="crop_height" value="32"/><rfilter type="box"/></film>'
+
 SCENES = {
     # Materials.
     "diffuse": ball(bsdf("diffuse", rgb("reflectance", "0.2, 0.5, 0.8"))),
@@ -185,8 +196,12 @@ SCENES = {
     "fov_axes": scene(BALL.format(GREY), sensor=sensor("perspective", number("fov", 40), string("fov_axis", "diagonal")), film=FILM.replace('width" value="32', 'width" value="48')),
     "focal_length": scene(BALL.format(GREY), sensor=sensor("perspective", string("focal_length", "60mm"))),
     "principal_point": scene(BALL.format(GREY), sensor=sensor("perspective", number("fov", 35), number("principal_point_offset_x", 0.2), number("principal_point_offset_y", -0.1))),
-    "crop": scene(BALL.format(GREY), film=f'<film type="hdrfilm">{SMALL}<integer name="crop_offset_x" value="16"/><integer name="crop_offset_y" value="10"/><integer name="crop_width" value="32"/><integer name="crop_height" value="32"/><rfilter type="box"/></film>'),
+    "crop": scene(BALL.format(GREY), film=CROPPED),
     "thinlens": scene(BALL.format(GREY), sensor=sensor("thinlens", number("fov", 35), number("aperture_radius", 0.3), number("focus_distance", 4))),
+    "orthographic": scene(BALL.format(bsdf("roughconductor", number("alpha", 0.2))), sensor=parallel('value="1.6"')),
+    "orthographic_glass": scene(BALL.format(bsdf("dielectric")), sensor=parallel('value="1.6"')),
+    "orthographic_clipped": scene(placed_box(), sensor=parallel('x="-1.6" y="1.2" z="2"', number("near_clip", 2.55), number("far_clip", 3.4)), film=FILM.replace('width" value="32', 'width" value="48')),
+    "orthographic_crop": scene(BALL.format(GREY), sensor=parallel('value="2"'), film=CROPPED),
     # Values.
     "spectra": scene(BALL.format(bsdf("diffuse", '<spectrum name="reflectance" value="400:0.1, 500:0.2, 600:0.7, 700:0.6"/>')), light=LAMP.replace(rgb("radiance", "4, 4.5, 5"), '<spectrum name="radiance" value="400:2, 500:3, 600:5, 700:8"/>')),
 }
