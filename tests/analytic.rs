@@ -4,7 +4,7 @@
 
 use glam::{DVec2, DVec3, Vec3};
 use pathblend::bsdf::{Bsdf, Conductor, Dielectric, Diffuse, Distribution, RoughConductor, Roughness};
-use pathblend::camera::Camera;
+use pathblend::camera::{Camera, Projection};
 use pathblend::film::Filter;
 use pathblend::geometry::Solid;
 use pathblend::image::{Image, Layer};
@@ -26,8 +26,7 @@ fn camera(origin: DVec3, towards: DVec3, half: f64) -> Camera {
         size: [SIZE, SIZE],
         half: DVec2::splat(half),
         center: DVec2::ZERO,
-        lens_radius: 0.0,
-        focus_distance: 1.0,
+        projection: Projection::Perspective { lens_radius: 0.0, focus_distance: 1.0 },
     }
 }
 

@@ -4,7 +4,7 @@
 
 use glam::{DAffine2, DMat3, DVec2, DVec3, Vec2, Vec3};
 use pathblend::bsdf::{Bsdf, Diffuse};
-use pathblend::camera::Camera;
+use pathblend::camera::{Camera, Projection};
 use pathblend::emitter::{Backdrop, Panorama, Spot, Start, Sun};
 use pathblend::film::Filter;
 use pathblend::geometry::Solid;
@@ -40,8 +40,7 @@ fn build(builder: Builder) -> Scene {
         size: [SIZE, SIZE],
         half: DVec2::splat(1e-3),
         center: DVec2::ZERO,
-        lens_radius: 0.0,
-        focus_distance: 1.0,
+        projection: Projection::Perspective { lens_radius: 0.0, focus_distance: 1.0 },
     };
     builder.build(camera, FilmSpec { size: [SIZE, SIZE], filter: Filter::Box }, 3).expect("a sound scene")
 }

@@ -24,7 +24,7 @@ fn message_of(text: &str, options: &Options) -> String {
 }
 
 /// Each body with a ^ where the caret must stand, and how its message starts.
-const BODIES: [(&str, &str); 84] = [
+const BODIES: [(&str, &str); 87] = [
     // Plugins that do not exist, or not here.
     (
         r#"^<bsdf type="velvet"/>"#,
@@ -275,6 +275,18 @@ const BODIES: [(&str, &str); 84] = [
     (
         r#"^<sensor type="thinlens"><float name="fov" value="90"/></sensor>"#,
         "sensor `thinlens` lacks the parameter `aperture_radius`",
+    ),
+    (
+        r#"<sensor type="orthographic">^<float name="fov" value="40"/></sensor>"#,
+        "unreferenced parameter `fov` in sensor `orthographic`; expected",
+    ),
+    (
+        r#"<sensor type="orthographic"><float name="near_clip" value="2"/><float name="far_clip" value="^2"/></sensor>"#,
+        "`far_clip` is 2; expected a number above `near_clip`",
+    ),
+    (
+        r#"<sensor type="orthographic">^<transform name="to_world"><matrix value="1 1 0 0 1 0 0 0 1"/></transform></sensor>"#,
+        "the axes of this camera are not at right angles",
     ),
     (
         r#"<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="^0"/></film></sensor>"#,

@@ -153,7 +153,7 @@ fn cameras_see_what_mitsubas_see() {
         let camera = load("3.0.0", &format!("<sensor type=\"perspective\">{body}</sensor>")).camera;
         let size = DVec2::new(camera.size[0] as f64, camera.size[1] as f64);
         let slopes = [DVec2::ZERO, size].map(|film| {
-            let local = camera.axes.to_local(camera.direction(camera.origin, film));
+            let local = camera.axes.to_local(camera.ray(film, [0.5; 4]).1);
             [local.x / local.z, local.y / local.z]
         });
         let near = slopes.as_flattened().iter().zip(expected).all(|(a, b)| (a - b).abs() < 2e-5);

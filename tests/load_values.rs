@@ -7,6 +7,7 @@ use pathblend::bsdf::{
     Bsdf, Conductor, Dielectric, Diffuse, Distribution, Mask, Phong, Plastic, RoughConductor, RoughDielectric,
     RoughPlastic, Roughness,
 };
+use pathblend::camera::Projection;
 use pathblend::film::Filter;
 use pathblend::load::{self, Options, UNBOUNDED_DEPTH};
 use pathblend::scene::{Caster, Scene};
@@ -134,7 +135,8 @@ fn spheres_can_be_turned_inside_out() {
 fn film_and_depth_are_taken() {
     let scene = load("");
     assert_eq!((scene.film.size, scene.film.filter), ([768, 576], Filter::Gaussian { stddev: 0.5 }));
-    assert_eq!((scene.max_depth, scene.camera.focus_distance), (UNBOUNDED_DEPTH, 1e4));
+    let pinhole = Projection::Perspective { lens_radius: 0.0, focus_distance: 1e4 };
+    assert_eq!((scene.max_depth, scene.camera.projection), (UNBOUNDED_DEPTH, pinhole));
     let depth =
         |value: i64| format!("<integrator type=\"any\"><integer name=\"max_depth\" value=\"{value}\"/></integrator>");
     assert_eq!(load(&depth(-1)).max_depth, UNBOUNDED_DEPTH);

@@ -65,8 +65,7 @@ impl State {
     /// The walk through the film position `film`; the lens is sampled by `row`.
     #[inline]
     pub(super) fn at_camera(scene: &Scene, film: DVec2, row: Row) -> Self {
-        let origin = scene.camera.lens(row);
-        let direction = scene.camera.direction(origin, film);
+        let (origin, direction) = scene.camera.ray(film, row);
         Self { origin: origin.into(), direction, throughput: Spectrum::ONE, word: Word::EMPTY, pdf: None }
     }
 

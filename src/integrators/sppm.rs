@@ -39,7 +39,6 @@ pub(super) struct Sppm {
     seed: u64,
     max_depth: usize,
     photons: usize,
-    pixel_width: f64,
     /// Square of the radius relative to the first one.
     shrinkage: f64,
 }
@@ -74,7 +73,6 @@ impl Sppm {
             seed: settings.seed,
             max_depth: settings.max_depth,
             photons: scene.camera.size.iter().product(),
-            pixel_width: scene.camera.pixel_width(),
             shrinkage: 1.0,
         }
     }
@@ -82,7 +80,7 @@ impl Sppm {
     pub(super) fn pass(&mut self, scene: &Scene, film: &mut Film, pass: u64, counts: &mut Counts) {
         let kernel = film.kernel.clone();
         let size = film.size;
-        let radius = FIRST_RADIUS * self.pixel_width * self.shrinkage.sqrt();
+        let radius = FIRST_RADIUS * self.shrinkage.sqrt();
         let walks = film.for_each_band(|index, band| {
             let caster = Caster::new(scene);
             let mut stream = Stream::new(self.seed, &[0, pass, index as u64]);
@@ -116,7 +114,7 @@ impl Sppm {
         kernel: &Kernel,
         size: [usize; 2],
         pixel: [usize; 2],
-        radius_per_distance: f64,
+        radius_in_pixels: f64,
         stream: &mut Stream,
         band: &mut Band,
         gathers: &mut Vec<Gather>,
@@ -148,7 +146,7 @@ impl Sppm {
                     throughput: state.throughput,
                     word: state.word,
                     edges,
-                    radius: radius_per_distance * distance,
+                    radius: radius_in_pixels * scene.camera.pixel_width(distance),
                     pixel,
                 });
                 if !bsdf.has_delta(met) {

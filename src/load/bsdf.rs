@@ -5,10 +5,12 @@ mod metals;
 mod microfacet;
 mod principled;
 
+use super::attributes::Skin;
 use super::document::Element;
 use super::error::{LoadError, one_of};
 use super::ior;
 use super::plugin::Plugin;
+use super::texture::Role;
 use crate::bsdf::{
     Blend, Bsdf, Coating, Conductor, Dielectric, Diffuse, Mask, Phong, Plastic, RoughCoat, RoughConductor,
     RoughDielectric, RoughPlastic, ThinDielectric,
@@ -69,27 +71,28 @@ pub(super) fn turned(bsdf: Bsdf) -> Bsdf {
     }
 }
 
-/// Reads a scattering model.
-pub(super) fn read(element: Element<'_>) -> Result<Model, LoadError> {
-    let mut reader = Reader::default();
+/// Reads a scattering model, as it is on the shape `skin`.
+pub(super) fn read(element: Element<'_>, skin: Option<&Skin>) -> Result<Model, LoadError> {
+    let mut reader = Reader { skin, depth: 0, relief: None };
     let bsdf = reader.read(element)?;
     Ok(Model { bsdf, relief: reader.relief })
 }
 
 /// What has been met on the way through nested models.
-#[derive(Default)]
-struct Reader {
+struct Reader<'s> {
+    /// The shape that textures lie on, where one of them shows an attribute.
+    skin: Option<&'s Skin>,
     depth: usize,
     relief: Option<Relief>,
 }
 
-impl Reader {
+impl Reader<'_> {
     fn read(&mut self, element: Element<'_>) -> Result<Bsdf, LoadError> {
         if self.depth > DEEPEST {
             return Err(element.error(format!("bsdfs nested more than {DEEPEST} deep; do references run in a circle?")));
         }
         self.depth += 1;
-        let mut plugin = Plugin::new(element)?;
+        let mut plugin = Plugin::new(element)?.on(self.skin);
         let bsdf = match plugin.kind {
             "mask" => Bsdf::Mask(Mask {
                 opacity: plugin.number_texture("opacity", 0.5)?,
@@ -179,9 +182,10 @@ impl Reader {
         }
         let bump = plugin.kind == "bumpmap";
         let name = if bump { "map" } else { "normalmap" };
-        let texture = match plugin.texture(name)? {
+        let role = if bump { Role::Height } else { Role::Normal };
+        let texture = match plugin.texture(name, role)? {
             Some(texture) => Some(texture),
-            None => plugin.any_texture()?,
+            None => plugin.any_texture(role)?,
         };
         let texture = texture.ok_or_else(|| plugin.lacks(name))?;
         let map = if bump {

@@ -1,5 +1,6 @@
 //! A scene as a tree of elements, over all the files that it is made of, whose ids are known.
 
+use super::attributes;
 use super::error::{LoadError, one_of};
 use super::files::{At, Files};
 use super::picture::Pictures;
@@ -27,9 +28,11 @@ pub(super) struct Document<'a> {
     ids: HashMap<String, (usize, Node<'a>)>,
     /// Fingerprints of what else was read: files with spectra.
     read: RefCell<Vec<blake3::Hash>>,
+    /// Whether any texture shows an attribute of a mesh.
+    pub shows_attributes: bool,
     /// Images that its textures show.
     pub pictures: Pictures,
-    /// What was read over in files of Mitsuba 0.5 and 0.6.
+    /// What was read over in files of Mitsuba 0.5 and 0.6, and what is hardly meant.
     pub warnings: RefCell<Vec<String>>,
 }
 
@@ -42,6 +45,7 @@ impl<'a> Document<'a> {
             legacy: vec![false; trees.len()],
             ids: HashMap::new(),
             read: RefCell::default(),
+            shows_attributes: false,
             pictures: Pictures::default(),
             warnings: RefCell::default(),
         };
@@ -53,7 +57,8 @@ impl<'a> Document<'a> {
         }
         document.aliases()?;
         references::check(&document)?;
-        Ok(document)
+        let shows_attributes = document.elements().any(attributes::is_attribute);
+        Ok(Self { shows_attributes, ..document })
     }
 
     /// The outermost element of the scene file.

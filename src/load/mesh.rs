@@ -1,5 +1,6 @@
 //! Triangle meshes on their way into the world.
 
+use super::attributes::RawAttribute;
 use super::transform::normal_matrix;
 use crate::scene::Mesh;
 use glam::{DAffine3, DVec2, DVec3};
@@ -13,6 +14,8 @@ pub(super) struct RawMesh {
     /// Texture coordinates per position; empty where the file has none.
     pub uvs: Vec<DVec2>,
     pub triangles: Vec<[u32; 3]>,
+    /// Further values, where they were asked for.
+    pub attributes: Vec<RawAttribute>,
     /// Whether the file itself asks for flat faces.
     pub face_normals: bool,
 }
@@ -58,6 +61,7 @@ impl RawMesh {
             normals: normals.iter().map(|n| n.as_vec3()).collect(),
             uvs: self.uvs.iter().map(|uv| uv.as_vec2()).collect(),
             triangles,
+            charted: false,
         }
     }
 

@@ -8,12 +8,13 @@
 //! - shapes `rectangle`, `cube`, `sphere`, `disk`, `cylinder`, `obj`, `ply`, `serialized`, `shapegroup`, `instance`;
 //! - bsdfs `diffuse`, `conductor`, `roughconductor`, `dielectric`, `thindielectric`, `roughdielectric`, `plastic`,
 //!   `roughplastic`, `principled`, `phong`, `coating`, `roughcoating`, `null`, `mask`, `blendbsdf`, `bumpmap`, `normalmap`, `twosided`;
-//! - textures `bitmap`, `checkerboard`;
+//! - textures `bitmap`, `checkerboard`, `mesh_attribute` of PLY meshes;
 //! - emitters `area`, `constant`, `envmap`, `sunsky` (also `sun`, `sky`), `point`, `spot`, `directional`;
 //! - colours as `<rgb>`, `<spectrum>` of values, pairs or a file; in old files also `<srgb>` and `<blackbody>`;
-//! - sensors `perspective`, `thinlens` with an `hdrfilm`, its crop, and the filters `box`, `tent`, `gaussian`;
+//! - sensors `perspective`, `thinlens`, `orthographic` with an `hdrfilm`, its crop, and the filters `box`, `tent`, `gaussian`;
 //! - any integrator's `max_depth` and `hide_emitters`; samplers are read over.
 
+mod attributes;
 mod bsdf;
 mod cie;
 mod document;
@@ -53,6 +54,7 @@ use source::Source;
 use std::collections::{BTreeMap, HashMap};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
+use texture::Role;
 
 /// Longest path, in edges, of a scene that sets no bound (`max_depth` −1 or missing).
 pub const UNBOUNDED_DEPTH: usize = 65;
@@ -154,8 +156,8 @@ impl Reader {
                 Ok(())
             }
             // Models that no shape refers to are checked, and then left out.
-            "bsdf" => bsdf::read(element).map(drop),
-            "texture" => texture::read(element).map(drop),
+            "bsdf" => bsdf::read(element, None).map(drop),
+            "texture" => texture::read(element, None, Role::Colour).map(drop),
             "emitter" => {
                 let add = |shine| self.builder.emitter(shine).map_err(|error| element.error(error.to_string()));
                 emitter::read(element)?.into_iter().try_for_each(add)
@@ -186,7 +188,11 @@ impl Reader {
     /// Adds a shape that `to_world` places once more.
     fn member(&mut self, element: Element<'_>, to_world: &DAffine3) -> Result<(), LoadError> {
         let shape = shape::read(element, to_world)?;
-        let bsdf = self.bsdf(shape.bsdf, shape.turned, shape.radiance.is_some())?;
+        let bsdf = match (&shape.skin, shape.bsdf) {
+            // What shows the attributes of a mesh belongs to it alone.
+            (Some(skin), Some(bsdf)) => self.add(bsdf::read(bsdf, Some(skin))?, shape.turned),
+            _ => self.bsdf(shape.bsdf, shape.turned, shape.radiance.is_some())?,
+        };
         if let Some(bytes) = &shape.file {
             self.builder.fingerprint(bytes);
         }
@@ -210,16 +216,22 @@ impl Reader {
         if let Some(id) = self.bsdfs.get(&key) {
             return Ok(*id);
         }
-        let Model { bsdf, relief } = match element {
-            Some(element) => bsdf::read(element)?,
+        let model = match element {
+            Some(element) => bsdf::read(element, None)?,
             None => Model { bsdf: bsdf::default(shines), relief: None },
         };
+        let id = self.add(model, turned);
+        self.bsdfs.insert(key, id);
+        Ok(id)
+    }
+
+    /// Adds a model to the scene.
+    fn add(&mut self, Model { bsdf, relief }: Model, turned: bool) -> BsdfId {
         let id = self.builder.bsdf(if turned { bsdf::turned(bsdf) } else { bsdf });
         if let Some(relief) = relief {
             self.builder.relief(id, relief);
         }
-        self.bsdfs.insert(key, id);
-        Ok(id)
+        id
     }
 
     fn finish(mut self, root: Element<'_>) -> Result<Loaded, LoadError> {

@@ -1,6 +1,7 @@
 //! A plugin element, such as `<bsdf type="diffuse">`, and the parameters inside it. Each parameter is taken once by the
 //! code that understands it; what is left over in the end is an error, as in Mitsuba.
 
+use super::attributes::Skin;
 use super::document::Element;
 use super::error::{LoadError, one_of};
 use super::legacy;
@@ -20,6 +21,8 @@ pub(super) struct Plugin<'a> {
     pub element: Element<'a>,
     /// The `type` attribute.
     pub kind: &'a str,
+    /// The shape that its textures lie on, where one of them shows an attribute.
+    pub skin: Option<&'a Skin>,
     children: Vec<Child<'a>>,
     /// What was asked for, to say what was expected.
     asked: Vec<String>,
@@ -78,7 +81,12 @@ impl<'a> Plugin<'a> {
             }
             children.push(Child { element: child, name });
         }
-        Ok(Self { element, kind, children, asked: Vec::new() })
+        Ok(Self { element, kind, skin: None, children, asked: Vec::new() })
+    }
+
+    /// The element as a part of the shape `skin`.
+    pub fn on(self, skin: Option<&'a Skin>) -> Self {
+        Self { skin, ..self }
     }
 
     /// An error that this kind of plugin is unknown.

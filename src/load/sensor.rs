@@ -3,13 +3,13 @@
 use super::document::Element;
 use super::error::LoadError;
 use super::plugin::Plugin;
-use crate::camera::Camera;
+use crate::camera::{Camera, Projection};
 use crate::film::Filter;
 use crate::math::Frame;
 use crate::scene::FilmSpec;
-use glam::{DAffine3, DVec2};
+use glam::{DAffine3, DVec2, DVec3};
 
-const KINDS: [&str; 2] = ["perspective", "thinlens"];
+const KINDS: [&str; 3] = ["perspective", "thinlens", "orthographic"];
 
 /// Width and height of a film that does not say.
 const DEFAULT_SIZE: [i64; 2] = [768, 576];
@@ -32,28 +32,25 @@ pub(super) fn read(element: Element<'_>, size: Option<[usize; 2]>) -> Result<(Ca
     let is_whole = crop.size == whole;
     let whole = size.filter(|_| is_whole).unwrap_or(whole);
     let crop = if is_whole { Crop { offset: [0, 0], size: whole } } else { crop };
-    let (mut half, center) = window(&mut plugin, whole, crop)?;
+    let parallel = plugin.kind == "orthographic";
+    let half = if parallel { half_size(&to_world, whole) } else { half_extent(&mut plugin, whole)? };
+    let principal = if parallel { DVec2::ZERO } else { principal_point(&mut plugin)? };
+    let (mut half, center) = window(half, principal, whole, crop);
     let size = size.unwrap_or(crop.size);
     if !is_whole {
         // A cropped film that is given another size keeps its width in the scene.
-        half.y = half.x * size[1] as f64 / size[0] as f64;
+        half.y *= (size[1] * crop.size[0]) as f64 / (size[0] * crop.size[1]) as f64;
     }
-    plugin.ignore(&["near_clip", "shutter_open", "shutter_close", "srf", "x_fov"]);
-    // Mitsuba focuses at the far clipping plane where nothing else is said.
-    let far_clip = plugin.positive("far_clip")?.unwrap_or(1e4);
-    let focus_distance = plugin.positive("focus_distance")?.unwrap_or(far_clip);
-    let lens_radius = match plugin.kind {
-        "thinlens" => {
-            let radius = plugin.float("aperture_radius")?.ok_or_else(|| plugin.lacks("aperture_radius"))?;
-            radius.check(|radius| *radius >= 0.0, "a number of at least 0")?
-        }
-        _ => 0.0,
+    plugin.ignore(&["shutter_open", "shutter_close", "srf", "x_fov"]);
+    let (origin, projection) = match plugin.kind {
+        "orthographic" => orthographic(&mut plugin, &to_world)?,
+        _ => (to_world.translation, perspective(&mut plugin)?),
     };
     plugin.finish()?;
     let axes = axes(&to_world).ok_or_else(|| {
         transform.error("the axes of this camera are not at right angles; expected a `to_world` without shear")
     })?;
-    let camera = Camera { origin: to_world.translation, axes, size, half, center, lens_radius, focus_distance };
+    let camera = Camera { origin, axes, size, half, center, projection };
     Ok((camera, FilmSpec { size, filter }))
 }
 
@@ -69,16 +66,51 @@ fn axes(to_world: &DAffine3) -> Option<Frame> {
     Some(Frame { tangent: tangent * tangent.dot(x).signum(), bitangent, normal: z })
 }
 
-/// Half the extents, and the middle, of the cropped film in the plane at distance 1.
-fn window(plugin: &mut Plugin<'_>, whole: [usize; 2], crop: Crop) -> Result<(DVec2, DVec2), LoadError> {
-    let half = half_extent(plugin, whole)?;
-    // In parts of the film, to the right and down.
-    let principal = ["principal_point_offset_x", "principal_point_offset_y"].map(|name| plugin.number(name, 0.0));
-    let [x, y] = principal;
+fn perspective(plugin: &mut Plugin<'_>) -> Result<Projection, LoadError> {
+    plugin.ignore(&["near_clip"]);
+    // Mitsuba focuses at the far clipping plane where nothing else is said.
+    let far_clip = plugin.positive("far_clip")?.unwrap_or(1e4);
+    let focus_distance = plugin.positive("focus_distance")?.unwrap_or(far_clip);
+    let lens_radius = match plugin.kind {
+        "thinlens" => {
+            let radius = plugin.float("aperture_radius")?.ok_or_else(|| plugin.lacks("aperture_radius"))?;
+            radius.check(|radius| *radius >= 0.0, "a number of at least 0")?
+        }
+        _ => 0.0,
+    };
+    Ok(Projection::Perspective { lens_radius, focus_distance })
+}
+
+/// The middle of the film, which lies at the near clipping plane, and how far rays go from there: as in Mitsuba 3 the
+/// scale of `to_world` moves the former and not the latter.
+fn orthographic(plugin: &mut Plugin<'_>, to_world: &DAffine3) -> Result<(DVec3, Projection), LoadError> {
+    plugin.ignore(&["focus_distance"]);
+    let near = plugin.positive("near_clip")?.unwrap_or(1e-2);
+    let depth = match plugin.float("far_clip")? {
+        Some(far) => far.check(|far| *far > near, "a number above `near_clip`")?,
+        None => 1e4,
+    } - near;
+    Ok((to_world.transform_point3(DVec3::Z * near), Projection::Orthographic { depth }))
+}
+
+/// Half the size of the film of an orthographic camera, which spans -1 to 1 along its x axis.
+fn half_size(to_world: &DAffine3, size: [usize; 2]) -> DVec2 {
+    let scale = |i| to_world.matrix3.col(i).length();
+    DVec2::new(scale(0), scale(1) * size[1] as f64 / size[0] as f64)
+}
+
+/// Where the axis of a camera meets the film, in parts of the film, to the right and down of its middle.
+fn principal_point(plugin: &mut Plugin<'_>) -> Result<DVec2, LoadError> {
+    let [x, y] = ["principal_point_offset_x", "principal_point_offset_y"].map(|name| plugin.number(name, 0.0));
+    Ok(DVec2::new(x?, y?))
+}
+
+/// Half the extents, and the middle, of the cropped part of a film with half the extents `half`.
+fn window(half: DVec2, principal: DVec2, whole: [usize; 2], crop: Crop) -> (DVec2, DVec2) {
     let vector = |size: [usize; 2]| DVec2::new(size[0] as f64, size[1] as f64);
     let share = vector(crop.size) / vector(whole);
     let middle = vector(crop.offset) / vector(whole) + 0.5 * share;
-    Ok((half * share, half * (DVec2::ONE - 2.0 * middle - 2.0 * DVec2::new(x?, y?))))
+    (half * share, half * (DVec2::ONE - 2.0 * middle - 2.0 * principal))
 }
 
 /// Tangents of half the fields of view along x and y.
@@ -210,7 +242,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
 
     use super::*;
-    use glam::{DMat3, DVec3};
+    use glam::DMat3;
 
     #[test]
     fn axes_are_orthonormal_and_keep_their_hand() {

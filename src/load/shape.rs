@@ -1,11 +1,13 @@
 //! `<shape>` elements.
 
+use super::attributes::{Skin, shows};
 use super::document::Element;
 use super::error::LoadError;
 use super::mesh::{self, Facing, RawMesh};
 use super::plugin::Plugin;
 use super::round;
 use super::source::read_bounded;
+use super::texture::Role;
 use super::{obj, ply, serialized};
 use crate::geometry::Solid;
 use crate::scene::Mesh;
@@ -27,6 +29,8 @@ pub(super) struct Shape<'a> {
     pub turned: bool,
     /// What it radiates.
     pub radiance: Option<Colour>,
+    /// The shape as its textures see it, where one of them shows an attribute.
+    pub skin: Option<Skin>,
     /// Bytes of the mesh file that it was read from.
     pub file: Option<Vec<u8>>,
 }
@@ -86,7 +90,8 @@ pub(super) fn read<'a>(element: Element<'a>, outer: &DAffine3) -> Result<Shape<'
     let to_world = *outer * inner;
     let flip_normals = plugin.boolean("flip_normals")?;
     let (mut turned, mut file) = (false, None);
-    let form = match plugin.kind {
+    let mut skin = shows(element)?.then(|| Skin::bare(format!("this {}", plugin.kind)));
+    let mut form = match plugin.kind {
         "sphere" | "disk" | "cylinder" => {
             let round = round::read(&mut plugin, &to_world, transform, flip_normals)?;
             turned = round.turned;
@@ -98,34 +103,40 @@ pub(super) fn read<'a>(element: Element<'a>, outer: &DAffine3) -> Result<Shape<'
                 "rectangle" => mesh::rectangle().place_solid(&to_world, flip_normals),
                 "cube" => mesh::cube().place_solid(&to_world, flip_normals),
                 _ => {
-                    let (raw, bytes) = mesh_file(&mut plugin)?;
-                    file = Some(bytes);
-                    raw.place(&to_world, Facing { face_normals, flip_normals })
+                    let mut read = mesh_file(&mut plugin, skin.is_some())?;
+                    file = Some(read.bytes);
+                    let attributes = std::mem::take(&mut read.raw.attributes);
+                    let mesh = read.raw.place(&to_world, Facing { face_normals, flip_normals });
+                    skin = skin.map(|_| Skin::of(format!("the mesh {}", read.name), &mesh, attributes));
+                    mesh
                 }
             })
         }
     };
+    if let Form::Mesh(mesh) = &mut form {
+        mesh.charted = skin.is_some();
+    }
     check_size(&form, element)?;
     let bsdf = plugin.object("bsdf")?;
-    let radiance = plugin.object("emitter")?.map(area).transpose()?;
+    let radiance = plugin.object("emitter")?.map(|emitter| area(emitter, skin.as_ref())).transpose()?;
     plugin.finish()?;
     if turned && radiance.is_some() {
         let kind = element.required("type")?.text;
         let message = format!("a {kind} that shines inwards is not supported; its normals must point outwards");
         return Err(element.error(message));
     }
-    Ok(Shape { form, bsdf, turned, radiance, file })
+    Ok(Shape { form, bsdf, turned, radiance, skin, file })
 }
 
 /// Reads the emitter of a shape.
-fn area(element: Element<'_>) -> Result<Colour, LoadError> {
-    let mut plugin = Plugin::new(element)?;
+fn area(element: Element<'_>, skin: Option<&Skin>) -> Result<Colour, LoadError> {
+    let mut plugin = Plugin::new(element)?.on(skin);
     if plugin.kind != "area" {
         let message = format!("unexpected emitter `{}` in a shape; expected area", plugin.kind);
         return Err(element.error(message));
     }
     plugin.ignore(&["sampling_weight"]);
-    let radiance = match plugin.texture("radiance")? {
+    let radiance = match plugin.texture("radiance", Role::Colour)? {
         Some(texture) => Colour::Textured(texture),
         None => Colour::Constant(plugin.light("radiance")?),
     };
@@ -133,7 +144,14 @@ fn area(element: Element<'_>) -> Result<Colour, LoadError> {
     Ok(radiance)
 }
 
-fn mesh_file(plugin: &mut Plugin<'_>) -> Result<(RawMesh, Vec<u8>), LoadError> {
+/// A mesh file.
+struct MeshFile<'a> {
+    name: &'a str,
+    raw: RawMesh,
+    bytes: Vec<u8>,
+}
+
+fn mesh_file<'a>(plugin: &mut Plugin<'a>, attributes: bool) -> Result<MeshFile<'a>, LoadError> {
     let name = plugin.string("filename")?.ok_or_else(|| plugin.lacks("filename"))?.value;
     let path = name.source.beside(name.text);
     let bytes = read_bounded(&path, u64::MAX).map_err(|reason| {
@@ -146,7 +164,7 @@ fn mesh_file(plugin: &mut Plugin<'_>) -> Result<(RawMesh, Vec<u8>), LoadError> {
             plugin.ignore(&["collapse"]);
             obj::read(&bytes, plugin.boolean_or("flip_tex_coords", true)?)
         }
-        "ply" => ply::read(&bytes, plugin.boolean("flip_tex_coords")?),
+        "ply" => ply::read(&bytes, plugin.boolean("flip_tex_coords")?, attributes),
         _ => {
             let index = plugin.integer("shape_index")?;
             let index =
@@ -160,7 +178,7 @@ fn mesh_file(plugin: &mut Plugin<'_>) -> Result<(RawMesh, Vec<u8>), LoadError> {
         let message = format!("the mesh {} has a coordinate that is not a finite number", path.display());
         return Err(name.error(message));
     }
-    Ok((raw, bytes))
+    Ok(MeshFile { name: name.text, raw, bytes })
 }
 
 fn check_size(form: &Form, element: Element<'_>) -> Result<(), LoadError> {

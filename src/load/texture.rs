@@ -1,5 +1,6 @@
 //! `<texture>` elements, and the parameters of plugins that may be textures.
 
+use super::attributes::{self, Skin};
 use super::document::Element;
 use super::error::LoadError;
 use super::plugin::Plugin;
@@ -7,7 +8,7 @@ use crate::texture::{Bitmap, Checkerboard, Colour, Lookup, Number, Texture, Wrap
 use glam::{DAffine2, DAffine3, DMat2, DVec2};
 use std::sync::Arc;
 
-const KINDS: [&str; 2] = ["bitmap", "checkerboard"];
+const KINDS: [&str; 3] = ["bitmap", "checkerboard", attributes::KIND];
 
 /// Parameters of a texture that choose how it is stored, or how Mitsuba 0.6 filters it.
 const HARMLESS: [&str; 5] = ["format", "accel", "cache", "max_anisotropy", "coordinates"];
@@ -15,7 +16,7 @@ const HARMLESS: [&str; 5] = ["format", "accel", "cache", "max_anisotropy", "coor
 impl<'a> Plugin<'a> {
     /// A share of light that may be a texture: constants have channels from 0 to 1, `default` where it is not given.
     pub fn colour_texture(&mut self, name: &'static str, default: f64) -> Result<Colour, LoadError> {
-        match self.texture(name)? {
+        match self.texture(name, Role::Colour)? {
             Some(texture) => Ok(Colour::Textured(texture)),
             None => self.share(name, default).map(Colour::Constant),
         }
@@ -24,7 +25,7 @@ impl<'a> Plugin<'a> {
     /// A number that may be a texture, `default` where it is not given. The caller checks the range of a constant. A
     /// colour stands for its luminance.
     pub fn number_texture(&mut self, name: &'static str, default: f64) -> Result<Number, LoadError> {
-        if let Some(texture) = self.texture(name)? {
+        if let Some(texture) = self.texture(name, Role::Number)? {
             return Ok(Number::Textured(texture));
         }
         if self.has(name, &["rgb", "spectrum"]) {
@@ -36,33 +37,66 @@ impl<'a> Plugin<'a> {
 
     /// The texture in the place of the parameter `name`, nested or by reference; `None` where there is another kind of
     /// value or nothing.
-    pub fn texture(&mut self, name: &'static str) -> Result<Option<Arc<Texture>>, LoadError> {
+    pub fn texture(&mut self, name: &'static str, role: Role) -> Result<Option<Arc<Texture>>, LoadError> {
         if !self.has(name, &["texture"]) {
             return Ok(None);
         }
-        self.take(name, &["texture"])?.map(read).transpose()
+        let element = self.take(name, &["texture"])?;
+        element.map(|element| read(element, self.skin, role)).transpose()
     }
 
     /// The one nested texture, whatever its name: what bump and normal maps have.
-    pub fn any_texture(&mut self) -> Result<Option<Arc<Texture>>, LoadError> {
-        self.object("texture")?.map(read).transpose()
+    pub fn any_texture(&mut self, role: Role) -> Result<Option<Arc<Texture>>, LoadError> {
+        let element = self.object("texture")?;
+        element.map(|element| read(element, self.skin, role)).transpose()
     }
 }
 
-/// Reads a texture and the image that it names.
-pub(super) fn read(element: Element<'_>) -> Result<Arc<Texture>, LoadError> {
-    let mut plugin = Plugin::new(element)?;
+/// What a texture is read for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Role {
+    Colour,
+    Number,
+    Normal,
+    /// Its slopes by the texture coordinates: attributes of meshes have none in Mitsuba.
+    Height,
+}
+
+impl Role {
+    /// Numbers of channels that an attribute may have.
+    fn channels(self) -> &'static [usize] {
+        match self {
+            Self::Colour => &[1, 3],
+            Self::Number => &[1],
+            Self::Normal => &[3],
+            Self::Height => &[],
+        }
+    }
+}
+
+/// Reads a texture and the image that it names, as it lies on `skin`.
+pub(super) fn read(element: Element<'_>, skin: Option<&Skin>, role: Role) -> Result<Arc<Texture>, LoadError> {
+    let mut plugin = Plugin::new(element)?.on(skin);
+    if plugin.kind == attributes::KIND && role != Role::Height {
+        let texture = attributes::read(&mut plugin, role.channels())?;
+        plugin.finish()?;
+        return Ok(Arc::new(texture));
+    }
     let texture = match plugin.kind {
         "bitmap" => Texture::Bitmap(bitmap(&mut plugin)?),
         "checkerboard" => Texture::Checkerboard(Checkerboard {
             colours: [plugin.share("color0", 0.4)?, plugin.share("color1", 0.2)?],
             to_uv: to_uv(&mut plugin)?,
         }),
+        _ if role == Role::Height => return Err(plugin.unknown(&KINDS[..2])),
         _ => return Err(plugin.unknown(&KINDS)),
     };
     plugin.ignore(&HARMLESS);
     plugin.finish()?;
-    Ok(Arc::new(texture))
+    Ok(Arc::new(match skin.filter(|_| role != Role::Height) {
+        Some(skin) => skin.drape(texture),
+        None => texture,
+    }))
 }
 
 fn bitmap(plugin: &mut Plugin<'_>) -> Result<Bitmap, LoadError> {

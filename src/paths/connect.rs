@@ -4,6 +4,7 @@ use super::mis::{self, Heuristic, Junction};
 use super::subpath::{Vertex, VertexKind};
 use super::trace::{light_offset, reverse_pdf, shading_correction};
 use crate::bsdf::Evaluation;
+use crate::camera::Sight;
 use crate::emitter::{Emitter, Start};
 use crate::film::{PathClass, Word};
 use crate::math::{AreaPdf, Walk};
@@ -191,7 +192,6 @@ fn reach_camera(
     camera: &[Vertex],
     heuristic: Heuristic,
 ) -> Option<Connection> {
-    let lens = camera[0].position;
     // Lights seen directly are left to the walk from the camera, which finds every one of them.
     if light.len() == 1 {
         return None;
@@ -199,13 +199,9 @@ fn reach_camera(
     if !start.connects || matches!(start.kind, VertexKind::Light(_, Start::Infinite { .. } | Start::Point { .. })) {
         return None;
     }
-    let offset = start.position - lens;
-    let distance_squared = offset.length_squared();
-    let direction = offset / distance_squared.sqrt();
-    let film = scene.camera.film(lens, direction)?;
-    let importance = scene.camera.direction_pdf(direction);
+    let Sight { lens, direction, film, density } = scene.camera.sight(camera[0].position, start.position)?;
     let light_end = end_of(scene, light, -direction, Walk::FromLight)?;
-    let value = start.throughput * light_end.value * (importance.0 / distance_squared);
+    let value = start.throughput * light_end.value * density;
     if value.is_black() || !scene.seen(light_end.origin, start.surface(), lens) {
         return None;
     }
@@ -215,7 +211,7 @@ fn reach_camera(
         _ => return None,
     };
     let junction = Junction {
-        light: importance.to_area(normal.dot(direction), distance_squared).0,
+        light: density * normal.dot(direction).abs(),
         light_previous: light_end.previous,
         ..Junction::default()
     };

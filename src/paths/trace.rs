@@ -23,8 +23,7 @@ pub fn trace_camera(
 ) {
     path.vertices.clear();
     path.film = film;
-    let lens = scene.camera.lens(first);
-    let direction = scene.camera.direction(lens, film);
+    let (lens, direction) = scene.camera.ray(film, first);
     path.vertices.push(Vertex {
         kind: VertexKind::Camera,
         position: lens,
@@ -36,7 +35,8 @@ pub fn trace_camera(
         delta: false,
         word: Word::EMPTY,
     });
-    let pdf = scene.camera.direction_pdf(direction);
+    // As for a light, the density of the first surface is known to where the walk starts.
+    let pdf = SolidAnglePdf(0.0);
     let walker = Walker { origin: lens.into(), direction, throughput: Spectrum::ONE, pdf, word: Word::EMPTY };
     walk(scene, walker, Walk::FromCamera, rows, vertices, roulette_from, path);
 }
@@ -193,6 +193,7 @@ fn surface_vertex(scene: &Caster<'_>, surface: &Surface, walker: &Walker, previo
     let distance_squared = (surface.position - previous.position).length_squared();
     let forward = match &previous.kind {
         VertexKind::Light(id, start) => scene.emitter(*id).emit_pdf(start, walker.direction, cos, distance_squared),
+        VertexKind::Camera => scene.camera.arrival_pdf(walker.direction, cos, distance_squared),
         _ => walker.pdf.to_area(cos, distance_squared),
     };
     let met = scene.met(surface, surface.frame.to_local(-walker.direction));

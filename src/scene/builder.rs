@@ -8,8 +8,8 @@ use crate::film::Filter;
 use crate::geometry::{Bvh, Solid, geometric_normal, offset};
 use crate::math::Discrete;
 use crate::spectrum::Spectrum;
-use crate::texture::{Colour, Relief};
-use glam::{DVec3, Vec2, Vec3};
+use crate::texture::{Colour, Relief, attribute};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 use thiserror::Error;
 
 /// A triangle mesh in world space.
@@ -23,6 +23,8 @@ pub struct Mesh {
     pub uvs: Vec<Vec2>,
     /// Indices into the positions, counter-clockwise as seen from outside.
     pub triangles: Vec<[u32; 3]>,
+    /// Whether its textures are looked up by its faces: see [`crate::texture::attribute`].
+    pub charted: bool,
 }
 
 /// What the scene file says about the image.
@@ -135,22 +137,24 @@ impl Builder {
             return Err(SceneError::VertexOutOfRange { index: *index, vertices: mesh.positions.len() });
         }
         // Light shines on the side that the vertex normals point to, as `Builder::face` has it.
-        let corners = |triangle: &[u32; 3]| {
+        let corners = |(index, triangle): (usize, &[u32; 3])| {
             let [a, b, c] = triangle.map(|i| mesh.positions[i as usize].as_dvec3());
             let normals = triangle.iter().filter_map(|i| mesh.normals.get(*i as usize));
             let towards = normals.sum::<Vec3>().as_dvec3();
             // Without texture coordinates, barycentric ones stand in, as in `Scene::triangle_surface`.
-            let [ua, ub, uc] = match mesh.uvs.is_empty() {
-                true => [Vec2::ZERO, Vec2::X, Vec2::Y],
-                false => triangle.map(|i| mesh.uvs.get(i as usize).copied().unwrap_or_default()),
+            let [ua, ub, uc] = match (mesh.charted, mesh.uvs.is_empty()) {
+                (true, _) => [DVec2::ZERO, DVec2::X, DVec2::Y].map(|at| attribute::place(index as u32, at).as_vec2()),
+                (false, true) => [Vec2::ZERO, Vec2::X, Vec2::Y],
+                (false, false) => triangle.map(|i| mesh.uvs.get(i as usize).copied().unwrap_or_default()),
             };
             match (b - a).cross(c - a).dot(towards) < 0.0 {
                 true => ([a, c, b], [ua, uc, ub]),
                 false => ([a, b, c], [ua, ub, uc]),
             }
         };
-        let surface = |()| Surface::triangles(mesh.triangles.iter().map(corners));
-        let shape = self.shape(bsdf, radiance, !mesh.uvs.is_empty(), surface)?;
+        let surface = |()| Surface::triangles(mesh.triangles.iter().enumerate().map(corners));
+        let chart = mesh.charted.then_some(self.triangles.len() as u32);
+        let shape = self.shape(bsdf, radiance, !mesh.uvs.is_empty(), chart, surface)?;
         let base = self.vertices.len() as u32;
         self.triangles.extend(mesh.triangles.iter().map(|t| t.map(|i| i + base)));
         self.triangle_shapes.resize(self.triangles.len(), shape);
@@ -165,7 +169,7 @@ impl Builder {
     /// Adds a sphere or a disk, which shines with `radiance` where one is given.
     pub fn solid(&mut self, solid: Solid, bsdf: BsdfId, radiance: Option<Colour>) -> Result<(), SceneError> {
         let surface = |()| Some(Surface::Solid(solid)).filter(|surface| surface.area() > 0.0);
-        let shape = self.shape(bsdf, radiance, true, surface)?;
+        let shape = self.shape(bsdf, radiance, true, None, surface)?;
         self.solids.push(solid);
         self.solid_shapes.push(shape);
         Ok(())
@@ -176,6 +180,7 @@ impl Builder {
         bsdf: BsdfId,
         radiance: Option<Colour>,
         mapped: bool,
+        chart: Option<u32>,
         surface: impl FnOnce(()) -> Option<Surface>,
     ) -> Result<u32, SceneError> {
         let model = &self.bsdfs[bsdf.0 as usize];
@@ -190,7 +195,7 @@ impl Builder {
             }
             None => None,
         };
-        self.shapes.push(Shape { bsdf, emitter, textured, oriented, mapped });
+        self.shapes.push(Shape { bsdf, emitter, textured, oriented, mapped, chart });
         Ok(self.shapes.len() as u32 - 1)
     }
 

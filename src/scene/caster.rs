@@ -54,7 +54,7 @@ impl<'a> Caster<'a> {
         while self.scene.hide_emitters && surface.emitter.is_some() {
             surface = self.intersect(surface.leave(direction), direction)?;
         }
-        Some(surface)
+        self.scene.camera.reaches(surface.position).then_some(surface)
     }
 
     /// Whether the camera sees the point that `from` starts at from its lens at `lens`; `surface` is what it lies on.

@@ -15,7 +15,7 @@ use crate::camera::Camera;
 use crate::emitter::{Emitter, Start};
 use crate::geometry::{Bvh, NO_TRIANGLE, Primitive, Ray, Solid, SurfacePoint};
 use crate::math::{AreaPdf, Discrete, Frame, Row};
-use crate::texture::Relief;
+use crate::texture::{Relief, attribute};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
 /// Index into the scene's scattering models.
@@ -37,6 +37,8 @@ struct Shape {
     oriented: bool,
     /// Whether its vertices have texture coordinates.
     mapped: bool,
+    /// Its first triangle, where textures are looked up by faces.
+    chart: Option<u32>,
 }
 
 /// What every point of a triangle shares.
@@ -105,7 +107,8 @@ impl Scene {
         } else {
             (normal, normal)
         };
-        let Shape { bsdf, emitter, textured, oriented, mapped } = self.shapes[self.triangle_shapes[index] as usize];
+        let Shape { bsdf, emitter, textured, oriented, mapped, chart } =
+            self.shapes[self.triangle_shapes[index] as usize];
         let (mut uv, mut frame, mut up) = (DVec2::ZERO, Frame::around(shading), DVec3::Z);
         if textured {
             // Without texture coordinates, barycentric ones stand in, as in Mitsuba.
@@ -113,21 +116,27 @@ impl Scene {
                 true => corners.map(|i| self.uvs[i as usize].as_dvec2()),
                 false => [DVec2::ZERO, DVec2::X, DVec2::Y],
             };
-            uv = uvs[0] * w + uvs[1] * u + uvs[2] * v;
+            let mapped = uvs[0] * w + uvs[1] * u + uvs[2] * v;
+            uv = match chart {
+                Some(first) => attribute::place(index as u32 - first, DVec2::new(u, v)),
+                None => mapped,
+            };
             if oriented {
-                (frame, up) = self.orient(shading, bsdf, uv, relief::derivatives([a, b, c], uvs, normal));
+                let derivatives = relief::derivatives([a, b, c], uvs, normal);
+                (frame, up) = self.orient(shading, bsdf, [uv, mapped], derivatives);
             }
         }
         let (position, triangle) = (a * w + b * u + c * v, index as u32);
         Surface { position, geometric, frame, up, uv, bsdf, emitter, offset, triangle }
     }
 
-    /// The shading frame where it has to follow the texture coordinates, and `normal` in it.
-    fn orient(&self, normal: DVec3, bsdf: BsdfId, uv: DVec2, derivatives: [DVec3; 2]) -> (Frame, DVec3) {
+    /// The shading frame where it has to follow the texture coordinates, and `normal` in it. `at` are the place where
+    /// textures are looked up, and the texture coordinates.
+    fn orient(&self, normal: DVec3, bsdf: BsdfId, at: [DVec2; 2], derivatives: [DVec3; 2]) -> (Frame, DVec3) {
         let frame = relief::oriented(normal, derivatives[0]);
         match &self.reliefs[bsdf.0 as usize] {
             Some(relief) => {
-                let tilted = relief::tilted(frame, &relief.map, uv, derivatives);
+                let tilted = relief::tilted(frame, &relief.map, at, derivatives);
                 (tilted, tilted.to_local(normal))
             }
             None => (frame, DVec3::Z),
@@ -143,7 +152,7 @@ impl Scene {
             let chart = self.solids[index].chart(position);
             uv = chart.uv;
             if oriented {
-                (frame, up) = self.orient(normal, bsdf, uv, chart.derivatives);
+                (frame, up) = self.orient(normal, bsdf, [uv, uv], chart.derivatives);
             }
         }
         Surface { position, geometric: normal, frame, up, uv, bsdf, emitter, offset, triangle: NO_TRIANGLE }

@@ -16,8 +16,9 @@ pub(super) fn oriented(normal: DVec3, along: DVec3) -> Frame {
     }
 }
 
-/// The frame as `map` tilts it at `uv`; `derivatives` are those of the position by u and v.
-pub(super) fn tilted(frame: Frame, map: &ReliefMap, uv: DVec2, derivatives: [DVec3; 2]) -> Frame {
+/// The frame as `map` tilts it; `derivatives` are those of the position by u and v. Slopes are slopes by the texture
+/// coordinates `uv`; all other textures are looked up at `place`.
+pub(super) fn tilted(frame: Frame, map: &ReliefMap, [place, uv]: [DVec2; 2], derivatives: [DVec3; 2]) -> Frame {
     let normal = frame.normal;
     match map {
         ReliefMap::Bump { texture, scale } => {
@@ -29,7 +30,7 @@ pub(super) fn tilted(frame: Frame, map: &ReliefMap, uv: DVec2, derivatives: [DVe
             oriented(if tilted.dot(normal) < 0.0 { -tilted } else { tilted }, along_u)
         }
         ReliefMap::Normal { texture } => {
-            let [x, y, z] = texture.colour(uv).to_rgb();
+            let [x, y, z] = texture.colour(place).to_rgb();
             let local = DVec3::new(2.0 * x - 1.0, 2.0 * y - 1.0, 2.0 * z - 1.0);
             match frame.to_world(local).try_normalize() {
                 Some(tilted) => oriented(tilted, derivatives[0]),
@@ -72,7 +73,7 @@ mod tests {
         let flat = Checkerboard { colours: [Spectrum::rgb(0.5, 0.5, 1.0); 2], to_uv: DAffine2::IDENTITY };
         let map = ReliefMap::Normal { texture: Arc::new(Texture::Checkerboard(flat)) };
         let frame = oriented(DVec3::Z, DVec3::new(3.0, 4.0, 1.0));
-        let same = tilted(frame, &map, DVec2::new(0.2, 0.3), [DVec3::new(3.0, 4.0, 1.0), DVec3::X]);
+        let same = tilted(frame, &map, [DVec2::new(0.2, 0.3); 2], [DVec3::new(3.0, 4.0, 1.0), DVec3::X]);
         assert!((same.normal - DVec3::Z).length() < 1e-12 && (same.tangent - frame.tangent).length() < 1e-12);
         assert!((frame.tangent - DVec3::new(0.6, 0.8, 0.0)).length() < 1e-12);
     }

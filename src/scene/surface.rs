@@ -15,7 +15,7 @@ pub struct Surface {
     pub frame: Frame,
     /// The shading normal before a relief tilted it, in the shading frame: +z where there is none.
     pub up: DVec3,
-    /// Texture coordinates.
+    /// Where its textures are looked up: texture coordinates, or a place in the chart of its mesh.
     pub uv: DVec2,
     /// How it scatters.
     pub bsdf: BsdfId,

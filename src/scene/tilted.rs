@@ -188,7 +188,7 @@ mod tests {
     /// Calls `check` with a tilted surface of `bsdf`, and the tilted frame.
     fn with<R>(bsdf: &Bsdf, check: impl FnOnce(Tilted<'_>, Frame) -> R) -> R {
         let relief = relief();
-        let frame = tilted(oriented(DVec3::Z, DVec3::X), &relief.map, DVec2::ZERO, [DVec3::X, DVec3::Y]);
+        let frame = tilted(oriented(DVec3::Z, DVec3::X), &relief.map, [DVec2::ZERO; 2], [DVec3::X, DVec3::Y]);
         let up = frame.to_local(DVec3::Z);
         check(Tilted { bsdf, relief: &relief, up, uv: DVec2::ZERO }, frame)
     }

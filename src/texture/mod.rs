@@ -1,9 +1,11 @@
-//! Quantities that vary over a surface, by its texture coordinates.
+//! Quantities that vary over a surface, by its texture coordinates, or by its faces (see [`attribute`]).
 
+pub mod attribute;
 mod bitmap;
 mod checkerboard;
 mod picture;
 
+pub use attribute::{Attribute, Draped};
 pub use bitmap::{Bitmap, Lookup, Wrap};
 pub use checkerboard::Checkerboard;
 pub use picture::{Picture, Texels};
@@ -19,6 +21,10 @@ pub enum Texture {
     Checkerboard(Checkerboard),
     /// An image.
     Bitmap(Bitmap),
+    /// Values of a mesh.
+    Attribute(Attribute),
+    /// Another texture on a mesh with values.
+    Draped(Draped),
 }
 
 impl Texture {
@@ -28,6 +34,8 @@ impl Texture {
         match self {
             Self::Checkerboard(checkerboard) => checkerboard.colour(uv),
             Self::Bitmap(bitmap) => bitmap.colour(uv),
+            Self::Attribute(attribute) => attribute.colour(uv),
+            Self::Draped(draped) => draped.colour(uv),
         }
     }
 
@@ -36,6 +44,8 @@ impl Texture {
         match self {
             Self::Checkerboard(checkerboard) => (checkerboard.colours[0] + checkerboard.colours[1]) * 0.5,
             Self::Bitmap(bitmap) => bitmap.mean(),
+            Self::Attribute(attribute) => attribute.mean(),
+            Self::Draped(draped) => draped.texture.mean(),
         }
     }
 }

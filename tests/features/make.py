@@ -83,6 +83,10 @@ def bitmap(parameter, file, *parameters):
     return f'<texture type="bitmap" name="{parameter}">{string("filename", file)}{"".join(parameters)}</texture>'
 
 
+def attribute(parameter, name, *parameters):
+    return f'<texture type="mesh_attribute" name="{parameter}">{string("name", name)}{"".join(parameters)}</texture>'
+
+
 def emitter(kind, *parameters):
     return f'<emitter type="{kind}">{"".join(parameters)}</emitter>'
 
@@ -98,11 +102,25 @@ def sensor(kind, *parameters):
     {{film}}</sensor>"""
 
 
+def parallel(scale, *parameters):
+    return sensor("orthographic", *parameters).replace("<lookat", f"<scale {scale}/><lookat")
+
+
+def placed_box():
+    """What is cut open by clipping planes."""
+    return f'<shape type="cube"><transform name="to_world"><scale value="0.6"/><translate y="0.6"/></transform><bsdf type="twosided">{bsdf("diffuse", COLOURS)}</bsdf></shape>'
+
+
+def painted(bsdf):
+    return placed("ply", string("filename", "painted.ply"), bsdf=bsdf)
+
+
 COLOURS = bitmap("reflectance", "colours.png")
 UV = '<transform name="to_uv"><scale x="2.5" y="1.5"/><translate x="0.3" y="-0.2"/></transform>'
 DIFFUSE = rgb("diffuse_reflectance", "0.3, 0.5, 0.7")
 RED, BLUE = (bsdf("diffuse", rgb("reflectance", v)) for v in ("0.7, 0.2, 0.1", "0.1, 0.2, 0.7"))
 SMALL = '<integer name="width" value="64"/><integer name="height" value="48"/>'
+CROPPED = f'<film type="hdrfilm">{SMALL}<integer name="crop_offset_x" value="16"/><integer name="crop_offset_y" value="10"/><integer name="crop_width" value="32"/><integer name="crop_height" value="32"/><rfilter type="box"/></film>'
 
 SCENES = {
     # Materials.
@@ -143,6 +161,19 @@ SCENES = {
     "bitmap_on_cylinder": scene(f'<shape type="cylinder"><point name="p0" x="-0.8" y="0.7" z="0"/><point name="p1" x="0.8" y="0.7" z="0.3"/><float name="radius" value="0.6"/><bsdf type="twosided">{bsdf("diffuse", COLOURS)}</bsdf></shape>'),
     "bitmap_on_disk": scene(f'<shape type="disk"><transform name="to_world"><scale value="0.8"/><rotate x="1" angle="-20"/><translate y="0.8"/></transform>{bsdf("diffuse", COLOURS)}</shape>'),
     "bitmap_on_cube": placed("cube", bsdf=bsdf("diffuse", COLOURS)),
+    # Values of meshes.
+    "attribute_vertex": painted(bsdf("diffuse", attribute("reflectance", "vertex_color", number("scale", 0.8)))),
+    "attribute_face": painted(bsdf("diffuse", attribute("reflectance", "face_color"))),
+    "attribute_bytes": scene(f'<shape type="ply">{string("filename", "bytes.ply")}{bsdf("diffuse", attribute("reflectance", "vertex_color", number("scale", 1 / 255)))}</shape>'),
+    "attribute_mask": painted(bsdf("mask", attribute("opacity", "face_gap"), bsdf("twosided", RED))),
+    "attribute_with_bitmap": painted(bsdf("blendbsdf", attribute("weight", "vertex_heat"), bsdf("diffuse", COLOURS), bsdf("roughconductor", attribute("alpha", "vertex_heat", number("scale", 0.5)), rgb("specular_reflectance", "0.9, 0.6, 0.4")))),
+    "attribute_principled": painted(bsdf("principled", attribute("base_color", "vertex_color"), attribute("roughness", "face_gap"), bitmap("metallic", "grey.png"))),
+    "attribute_normals": painted(bsdf("normalmap", attribute("normalmap", "vertex_tilt"), RED)),
+    "attribute_with_bump": painted(bsdf("bumpmap", bitmap("arbitrary", "waves.png", flag("raw")), number("scale", 0.1), bsdf("diffuse", attribute("reflectance", "vertex_color")))),
+    "attribute_mirrored": scene(f'<shape type="ply">{string("filename", "painted.ply")}<transform name="to_world"><scale x="-0.6" y="0.4" z="0.4"/><translate y="0.7"/></transform>{bsdf("twosided", bsdf("diffuse", attribute("reflectance", "vertex_color")))}</shape>'),
+    # Of faces: values of vertices Mitsuba 3.9.1 interpolates in the wrong place on an instance.
+    "attribute_instance": scene(f'<shape type="shapegroup" id="group"><shape type="ply">{string("filename", "painted.ply")}{bsdf("twosided", bsdf("diffuse", attribute("reflectance", "face_color")))}</shape></shape>'
+                                '<shape type="instance"><ref id="group"/><transform name="to_world"><scale x="-0.6" y="0.4" z="0.4"/><translate y="0.7"/></transform></shape>'),
     # Emitters.
     "area_textured": scene(BALL.format(GREY), light=LAMP.replace(rgb("radiance", "4, 4.5, 5"), bitmap("radiance", "colours.png", flag("raw")))),
     "sunsky": scene(BALL.format(bsdf("roughconductor", number("alpha", 0.2))), light=emitter("sunsky", number("turbidity", 4), number("sun_aperture", 10), number("sun_scale", 0.5), number("sky_scale", 3), '<vector name="sun_direction" x="1" y="1.5" z="0.7"/>', '<transform name="to_world"><rotate x="1" angle="-90"/></transform>')),
@@ -165,8 +196,12 @@ SCENES = {
     "fov_axes": scene(BALL.format(GREY), sensor=sensor("perspective", number("fov", 40), string("fov_axis", "diagonal")), film=FILM.replace('width" value="32', 'width" value="48')),
     "focal_length": scene(BALL.format(GREY), sensor=sensor("perspective", string("focal_length", "60mm"))),
     "principal_point": scene(BALL.format(GREY), sensor=sensor("perspective", number("fov", 35), number("principal_point_offset_x", 0.2), number("principal_point_offset_y", -0.1))),
-    "crop": scene(BALL.format(GREY), film=f'<film type="hdrfilm">{SMALL}<integer name="crop_offset_x" value="16"/><integer name="crop_offset_y" value="10"/><integer name="crop_width" value="32"/><integer name="crop_height" value="32"/><rfilter type="box"/></film>'),
+    "crop": scene(BALL.format(GREY), film=CROPPED),
     "thinlens": scene(BALL.format(GREY), sensor=sensor("thinlens", number("fov", 35), number("aperture_radius", 0.3), number("focus_distance", 4))),
+    "orthographic": scene(BALL.format(bsdf("roughconductor", number("alpha", 0.2))), sensor=parallel('value="1.6"')),
+    "orthographic_glass": scene(BALL.format(bsdf("dielectric")), sensor=parallel('value="1.6"')),
+    "orthographic_clipped": scene(placed_box(), sensor=parallel('x="-1.6" y="1.2" z="2"', number("near_clip", 2.55), number("far_clip", 3.4)), film=FILM.replace('width" value="32', 'width" value="48')),
+    "orthographic_crop": scene(BALL.format(GREY), sensor=parallel('value="2"'), film=CROPPED),
     # Values.
     "spectra": scene(BALL.format(bsdf("diffuse", '<spectrum name="reflectance" value="400:0.1, 500:0.2, 600:0.7, 700:0.6"/>')), light=LAMP.replace(rgb("radiance", "4, 4.5, 5"), '<spectrum name="radiance" value="400:2, 500:3, 600:5, 700:8"/>')),
 }
@@ -200,6 +235,28 @@ def write_meshes():
     body += b"".join(struct.pack("<B3i", 3, *t) for t in triangles)
     (HERE / "knot.ply").write_bytes("\n".join(head).encode() + b"\n" + body)
     write_serialized(vertices, triangles)
+    write_painted(vertices, triangles)
+
+
+def write_painted(vertices, triangles):
+    """The ring with values of vertices and faces, and a board whose vertices have colours of eight bits."""
+    from math import cos, sin
+    near = lambda i, k: 0.5 + 0.45 * sin(0.7 * i + 2.1 * k)
+    tilt = lambda i: (0.5 + 0.2 * sin(0.5 * i), 0.5 + 0.2 * cos(0.3 * i), 0.9)
+    head = ["ply", "format binary_little_endian 1.0", f"element vertex {len(vertices)}"]
+    head += [f"property float {name}" for name in "x y z nx ny nz u v heat_0 b g r tilt_x tilt_y tilt_z".split()]
+    head += [f"element face {len(triangles)}", "property list uchar int vertex_indices"]
+    head += [f"property float {name}" for name in "r g b gap_0".split()] + ["end_header"]
+    body = b"".join(struct.pack("<15f", *p, *n, *t, near(i, 3), *(near(i, k) for k in range(3)), *tilt(i))
+                    for i, (p, n, t) in enumerate(vertices))
+    body += b"".join(struct.pack("<B3i4f", 3, *t, *(near(3 * i, k) for k in range(4))) for i, t in enumerate(triangles))
+    (HERE / "painted.ply").write_bytes("\n".join(head).encode() + b"\n" + body)
+    lines = ["ply", "format ascii 1.0", "element vertex 6", *(f"property float {name}" for name in "xyz")]
+    lines += [*(f"property uchar {name}" for name in ("red", "green", "blue")), "element face 4"]
+    lines += ["property list uchar int vertex_indices", "end_header"]
+    lines += ["-1 0 0.3 255 20 0", "0 0 0 0 255 0", "1 0 0.3 20 0 255", "-1 1.5 0 255 255 0", "0 1.5 -0.5 255 0 255", "1 1.5 0 9 99 200"]
+    lines += ["3 0 1 4", "3 0 4 3", "3 1 2 5", "3 1 5 4"]
+    (HERE / "bytes.ply").write_text("\n".join(lines) + "\n")
 
 
 def write_serialized(vertices, triangles):
