@@ -120,7 +120,8 @@ mod tests {
         ];
         for (case, (turbidity, albedo)) in [(3.0, 0.2), (2.5, 0.45)].into_iter().enumerate() {
             let towards = turned(TOWARDS);
-            let sky = Sky { towards, turbidity, albedo: Spectrum::grey(albedo), stretch: 1.0, sun_model: SunModel::Preetham };
+            let sky =
+                Sky { towards, turbidity, albedo: Spectrum::grey(albedo), stretch: 1.0, sun_model: SunModel::Preetham };
             let dome = hosek::Dome::new(turbidity, sky.albedo, FRAC_PI_2 - sky.zenith());
             let image = sky.image(1.0).unwrap();
             for (i, direction) in directions.into_iter().map(turned).enumerate() {
@@ -161,7 +162,8 @@ mod tests {
     #[test]
     fn the_sun_is_as_bright_as_that_of_mitsuba_0_6() {
         let towards = DVec3::new(0.6145, 0.7830, 0.0960).normalize();
-        let sky = Sky { towards, turbidity: 5.0, albedo: Spectrum::grey(0.2), stretch: 1.0, sun_model: SunModel::Preetham };
+        let sky =
+            Sky { towards, turbidity: 5.0, albedo: Spectrum::grey(0.2), stretch: 1.0, sun_model: SunModel::Preetham };
         let found = sky.sun_irradiance(1.0).to_rgb();
         let close = found.iter().zip([1.1044, 0.8713, 0.6671]).all(|(a, b)| (a / b - 1.0).abs() < 0.01);
         assert!(close, "{found:?}");
@@ -170,7 +172,13 @@ mod tests {
     /// Its light does not depend on how large the disk is drawn.
     #[test]
     fn a_larger_sun_is_darker() {
-        let sky = Sky { towards: turned(TOWARDS), turbidity: 3.0, albedo: Spectrum::grey(0.2), stretch: 1.0, sun_model: SunModel::Preetham };
+        let sky = Sky {
+            towards: turned(TOWARDS),
+            turbidity: 3.0,
+            albedo: Spectrum::grey(0.2),
+            stretch: 1.0,
+            sun_model: SunModel::Preetham,
+        };
         let light = |sun: Sun| sun.radiance.luminance() / warp::cone::pdf(sun.cap).0;
         let (real, drawn) = (light(sky.sun(1.0, 2.0)), light(sky.sun(18.8131, 2.0)));
         assert!((real / drawn - 1.0).abs() < 1e-12 && (sky.sun(3.0, 1.0).towards - sky.towards).length() < 1e-12);
