@@ -1,5 +1,6 @@
 //! A scene as a tree of elements, over all the files that it is made of, whose ids are known.
 
+use super::bsdf::Coats;
 use super::error::{LoadError, one_of};
 use super::files::{At, Files};
 use super::picture::Pictures;
@@ -29,6 +30,8 @@ pub(super) struct Document<'a> {
     read: RefCell<Vec<blake3::Hash>>,
     /// Images that its textures show.
     pub pictures: Pictures,
+    /// Rough coats of its scattering models.
+    pub coats: Coats,
     /// What was read over in files of Mitsuba 0.5 and 0.6.
     pub warnings: RefCell<Vec<String>>,
 }
@@ -43,6 +46,7 @@ impl<'a> Document<'a> {
             ids: HashMap::new(),
             read: RefCell::default(),
             pictures: Pictures::default(),
+            coats: Coats::default(),
             warnings: RefCell::default(),
         };
         document.versions()?;
