@@ -2,11 +2,10 @@
 
 use super::document::Element;
 use super::error::LoadError;
-use super::mesh::{self, Facing, RawMesh};
+use super::mesh::{self, Facing};
+use super::mesh_file::MeshFile;
 use super::plugin::Plugin;
 use super::round;
-use super::source::read_bounded;
-use super::{obj, ply, serialized};
 use crate::geometry::Solid;
 use crate::scene::Mesh;
 use crate::texture::Colour;
@@ -20,6 +19,7 @@ const FAR: f64 = 1e18;
 
 /// A shape of the scene file.
 pub(super) struct Shape<'a> {
+    pub element: Element<'a>,
     pub form: Form,
     /// Its scattering model, if it names one.
     pub bsdf: Option<Element<'a>>,
@@ -27,8 +27,30 @@ pub(super) struct Shape<'a> {
     pub turned: bool,
     /// What it radiates.
     pub radiance: Option<Colour>,
-    /// Bytes of the mesh file that it was read from.
-    pub file: Option<Vec<u8>>,
+    /// Fingerprint of the mesh file that it was read from.
+    pub file: Option<blake3::Hash>,
+}
+
+/// A shape whose form is known, and the rest not yet.
+pub(super) struct Opened<'a> {
+    plugin: Plugin<'a>,
+    turned: bool,
+}
+
+/// The form of a shape, or where it is to be read: what can be done for many shapes at the same time.
+pub(super) enum Body<'a> {
+    Form(Form),
+    File(MeshFile<'a>),
+}
+
+impl Body<'_> {
+    /// The form, and the fingerprint of the file that it was read from.
+    pub fn read(self) -> Result<(Form, Option<blake3::Hash>), LoadError> {
+        match self {
+            Self::Form(form) => Ok((form, None)),
+            Self::File(file) => file.read().map(|(mesh, hash)| (Form::Mesh(mesh), Some(hash))),
+        }
+    }
 }
 
 /// A shape in world space.
@@ -76,8 +98,8 @@ fn check_member(shape: Element<'_>) -> Result<(), LoadError> {
     }
 }
 
-/// Reads a shape and the mesh file that it names; `outer` places it once more.
-pub(super) fn read<'a>(element: Element<'a>, outer: &DAffine3) -> Result<Shape<'a>, LoadError> {
+/// Reads what makes the form of a shape; `outer` places it once more.
+pub(super) fn open<'a>(element: Element<'a>, outer: &DAffine3) -> Result<(Opened<'a>, Body<'a>), LoadError> {
     let mut plugin = Plugin::new(element)?;
     if !KINDS.contains(&plugin.kind) {
         return Err(plugin.unknown(&KINDS));
@@ -85,36 +107,41 @@ pub(super) fn read<'a>(element: Element<'a>, outer: &DAffine3) -> Result<Shape<'
     let (inner, transform) = plugin.placement()?;
     let to_world = *outer * inner;
     let flip_normals = plugin.boolean("flip_normals")?;
-    let (mut turned, mut file) = (false, None);
-    let form = match plugin.kind {
+    let mut turned = false;
+    let body = match plugin.kind {
         "sphere" | "disk" | "cylinder" => {
             let round = round::read(&mut plugin, &to_world, transform, flip_normals)?;
             turned = round.turned;
-            Form::Solid(round.solid)
+            Body::Form(Form::Solid(round.solid))
         }
         kind => {
             let face_normals = plugin.boolean("face_normals")?;
-            Form::Mesh(match kind {
-                "rectangle" => mesh::rectangle().place_solid(&to_world, flip_normals),
-                "cube" => mesh::cube().place_solid(&to_world, flip_normals),
-                _ => {
-                    let (raw, bytes) = mesh_file(&mut plugin)?;
-                    file = Some(bytes);
-                    raw.place(&to_world, Facing { face_normals, flip_normals })
-                }
-            })
+            match kind {
+                "rectangle" => Body::Form(Form::Mesh(mesh::rectangle().place_solid(&to_world, flip_normals))),
+                "cube" => Body::Form(Form::Mesh(mesh::cube().place_solid(&to_world, flip_normals))),
+                _ => Body::File(MeshFile::of(&mut plugin, to_world, Facing { face_normals, flip_normals })?),
+            }
         }
     };
-    check_size(&form, element)?;
-    let bsdf = plugin.object("bsdf")?;
-    let radiance = plugin.object("emitter")?.map(area).transpose()?;
-    plugin.finish()?;
-    if turned && radiance.is_some() {
-        let kind = element.required("type")?.text;
-        let message = format!("a {kind} that shines inwards is not supported; its normals must point outwards");
-        return Err(element.error(message));
+    Ok((Opened { plugin, turned }, body))
+}
+
+impl<'a> Opened<'a> {
+    /// Reads the rest of a shape with this form, from this file.
+    pub fn finish(self, (form, file): (Form, Option<blake3::Hash>)) -> Result<Shape<'a>, LoadError> {
+        let Self { mut plugin, turned } = self;
+        let element = plugin.element;
+        check_size(&form, element)?;
+        let bsdf = plugin.object("bsdf")?;
+        let radiance = plugin.object("emitter")?.map(area).transpose()?;
+        plugin.finish()?;
+        if turned && radiance.is_some() {
+            let kind = element.required("type")?.text;
+            let message = format!("a {kind} that shines inwards is not supported; its normals must point outwards");
+            return Err(element.error(message));
+        }
+        Ok(Shape { element, form, bsdf, turned, radiance, file })
     }
-    Ok(Shape { form, bsdf, turned, radiance, file })
 }
 
 /// Reads the emitter of a shape.
@@ -131,36 +158,6 @@ fn area(element: Element<'_>) -> Result<Colour, LoadError> {
     };
     plugin.finish()?;
     Ok(radiance)
-}
-
-fn mesh_file(plugin: &mut Plugin<'_>) -> Result<(RawMesh, Vec<u8>), LoadError> {
-    let name = plugin.string("filename")?.ok_or_else(|| plugin.lacks("filename"))?.value;
-    let path = name.source.beside(name.text);
-    let bytes = read_bounded(&path, u64::MAX).map_err(|reason| {
-        let looked = name.source.looked(name.text);
-        name.error(format!("cannot read the mesh {}: {reason}{looked}", path.display()))
-    })?;
-    let raw = match plugin.kind {
-        "obj" => {
-            // Says how Mitsuba 0.6 groups what is one mesh here.
-            plugin.ignore(&["collapse"]);
-            obj::read(&bytes, plugin.boolean_or("flip_tex_coords", true)?)
-        }
-        "ply" => ply::read(&bytes, plugin.boolean("flip_tex_coords")?),
-        _ => {
-            let index = plugin.integer("shape_index")?;
-            let index =
-                index.map(|index| index.check(|index| *index >= 0, "a whole number of at least 0")).transpose()?;
-            serialized::read(&bytes, index.unwrap_or(0) as usize)
-        }
-    };
-    let raw = raw.map_err(|reason| name.error(format!("the mesh {} is broken: {reason}", path.display())))?;
-    let finite = raw.positions.iter().chain(&raw.normals).all(|v| v.is_finite());
-    if !finite || !raw.uvs.iter().all(|uv| uv.is_finite()) {
-        let message = format!("the mesh {} has a coordinate that is not a finite number", path.display());
-        return Err(name.error(message));
-    }
-    Ok((raw, bytes))
 }
 
 fn check_size(form: &Form, element: Element<'_>) -> Result<(), LoadError> {
