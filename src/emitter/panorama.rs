@@ -9,6 +9,7 @@ use crate::math::{Discrete, SolidAnglePdf};
 use crate::spectrum::Spectrum;
 use crate::texture::Picture;
 use glam::DVec3;
+use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -37,10 +38,10 @@ impl Panorama {
     pub fn new(picture: Arc<Picture>, scale: f64) -> Option<Self> {
         let blank = Discrete::new(&[1.0])?;
         let mut panorama = Self { picture, scale, rows: blank, columns: Vec::new(), integral: 0.0 };
-        let cells: Vec<_> = (0..panorama.row_count()).map(|row| panorama.weights(row)).collect();
+        let cells: Vec<_> = (0..panorama.row_count()).into_par_iter().map(|row| panorama.weights(row)).collect();
         let sums: Vec<f64> = cells.iter().map(|row| row.iter().sum()).collect();
         panorama.rows = Discrete::new(&sums)?;
-        panorama.columns = cells.iter().map(|row| Discrete::new(row)).collect();
+        panorama.columns = cells.par_iter().map(|row| Discrete::new(row)).collect();
         panorama.integral = sums.iter().sum();
         Some(panorama)
     }
