@@ -10,6 +10,7 @@ use crate::math::Discrete;
 use crate::spectrum::Spectrum;
 use crate::texture::{Colour, Relief};
 use glam::{DVec3, Vec2, Vec3};
+use rayon::prelude::*;
 use thiserror::Error;
 
 /// A triangle mesh in world space.
@@ -256,7 +257,7 @@ impl Builder {
     /// The scene as seen by `camera`. Builds the acceleration structure.
     pub fn build(mut self, camera: Camera, film: FilmSpec, max_depth: usize) -> Result<Scene, SceneError> {
         let bvh = Bvh::build(&self.vertices, &self.triangles, &self.solids);
-        let faces = self.triangles.iter().map(|triangle| self.face(triangle)).collect();
+        let faces = self.triangles.par_iter().map(|triangle| self.face(triangle)).collect();
         let (center, radius) = bvh.bounds().bounding_sphere();
         // A margin for rounding; an empty scene has an environment too.
         let radius = if radius > 0.0 { radius * (1.0 + 1e-6) } else { 1.0 };
