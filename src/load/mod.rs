@@ -65,7 +65,7 @@ pub const LARGEST_DEPTH: usize = 4096;
 const MOST_TRIANGLES: usize = 1 << 28;
 
 /// Most shapes whose files are in memory at the same time, before the scene has taken them over.
-const AT_ONCE: usize = 64;
+const AT_ONCE: usize = 32;
 
 const TAGS: [&str; 7] = ["default", "integrator", "sensor", "texture", "bsdf", "emitter", "shape"];
 

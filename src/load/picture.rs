@@ -110,7 +110,8 @@ fn decode(path: &Path, bytes: &[u8]) -> Result<Picture, String> {
 fn exr(path: &Path) -> Result<([usize; 2], Texels), String> {
     let image = Image::read(path).map_err(|error| error.to_string())?;
     let size = [image.width(), image.height()];
-    Ok((size, Texels::linear(image.colour.into_iter().collect())))
+    // Row by row, as it has been read.
+    Ok((size, Texels::linear(image.colour.into_raw_vec_and_offset().0)))
 }
 
 /// Every format but OpenEXR. What a file starts with counts more than its name; TGA has only the name.

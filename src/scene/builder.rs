@@ -1,11 +1,11 @@
 //! Assembles a [`Scene`] from what a file says.
 
-use super::{BsdfId, EmitterId, Face, Scene, Shape};
+use super::{BsdfId, EmitterId, Scene, Shape};
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::emitter::{Area, Backdrop, Constant, Directional, Emitter, Environment, Point, Reach, Spot, Surface};
 use crate::film::Filter;
-use crate::geometry::{Bvh, Solid, geometric_normal, offset};
+use crate::geometry::{Bvh, Solid, geometric_normal};
 use crate::math::Discrete;
 use crate::spectrum::Spectrum;
 use crate::texture::{Colour, Relief};
@@ -135,7 +135,7 @@ impl Builder {
         if let Some(index) = mesh.triangles.iter().flatten().find(|i| **i as usize >= mesh.positions.len()) {
             return Err(SceneError::VertexOutOfRange { index: *index, vertices: mesh.positions.len() });
         }
-        // Light shines on the side that the vertex normals point to, as `Builder::face` has it.
+        // Light shines on the side that the vertex normals point to, as `Builder::face_normal` has it.
         let corners = |triangle: &[u32; 3]| {
             let [a, b, c] = triangle.map(|i| mesh.positions[i as usize].as_dvec3());
             let normals = triangle.iter().filter_map(|i| mesh.normals.get(*i as usize));
@@ -151,7 +151,7 @@ impl Builder {
             }
         };
         let surface = |()| Surface::triangles(mesh.triangles.iter().map(corners));
-        let shape = self.shape(bsdf, radiance, !mesh.uvs.is_empty(), surface)?;
+        let shape = self.shape(bsdf, radiance, [!mesh.uvs.is_empty(), !mesh.normals.is_empty()], surface)?;
         let base = self.vertices.len() as u32;
         self.triangles.extend(mesh.triangles.iter().map(|t| t.map(|i| i + base)));
         self.triangle_shapes.resize(self.triangles.len(), shape);
@@ -166,7 +166,7 @@ impl Builder {
     /// Adds a sphere or a disk, which shines with `radiance` where one is given.
     pub fn solid(&mut self, solid: Solid, bsdf: BsdfId, radiance: Option<Colour>) -> Result<(), SceneError> {
         let surface = |()| Some(Surface::Solid(solid)).filter(|surface| surface.area() > 0.0);
-        let shape = self.shape(bsdf, radiance, true, surface)?;
+        let shape = self.shape(bsdf, radiance, [true, false], surface)?;
         self.solids.push(solid);
         self.solid_shapes.push(shape);
         Ok(())
@@ -176,7 +176,7 @@ impl Builder {
         &mut self,
         bsdf: BsdfId,
         radiance: Option<Colour>,
-        mapped: bool,
+        [mapped, smooth]: [bool; 2],
         surface: impl FnOnce(()) -> Option<Surface>,
     ) -> Result<u32, SceneError> {
         let model = &self.bsdfs[bsdf.0 as usize];
@@ -191,7 +191,7 @@ impl Builder {
             }
             None => None,
         };
-        self.shapes.push(Shape { bsdf, emitter, textured, oriented, mapped });
+        self.shapes.push(Shape { bsdf, emitter, textured, oriented, mapped, smooth });
         Ok(self.shapes.len() as u32 - 1)
     }
 
@@ -243,21 +243,17 @@ impl Builder {
     }
 
     /// Triangles without area have no normal; no ray hits them.
-    fn face(&self, triangle: &[u32; 3]) -> Face {
+    fn face_normal(&self, triangle: &[u32; 3]) -> DVec3 {
         let [a, b, c] = triangle.map(|i| self.vertices[i as usize].as_dvec3());
         let towards: Vec3 = triangle.iter().map(|i| self.normals[*i as usize]).sum();
         let normal = geometric_normal(a, b, c).unwrap_or(DVec3::Z);
-        Face {
-            normal: if normal.dot(towards.as_dvec3()) < 0.0 { -normal } else { normal },
-            offset: offset::of_triangle(a, b, c),
-            smooth: triangle.iter().any(|i| self.normals[*i as usize] != Vec3::ZERO),
-        }
+        if normal.dot(towards.as_dvec3()) < 0.0 { -normal } else { normal }
     }
 
     /// The scene as seen by `camera`. Builds the acceleration structure.
     pub fn build(mut self, camera: Camera, film: FilmSpec, max_depth: usize) -> Result<Scene, SceneError> {
         let bvh = Bvh::build(&self.vertices, &self.triangles, &self.solids);
-        let faces = self.triangles.par_iter().map(|triangle| self.face(triangle)).collect();
+        let face_normals = self.triangles.par_iter().map(|triangle| self.face_normal(triangle)).collect();
         let (center, radius) = bvh.bounds().bounding_sphere();
         // A margin for rounding; an empty scene has an environment too.
         let radius = if radius > 0.0 { radius * (1.0 + 1e-6) } else { 1.0 };
@@ -273,7 +269,7 @@ impl Builder {
             normals: self.normals,
             uvs: self.uvs,
             triangles: self.triangles,
-            faces,
+            face_normals,
             triangle_shapes: self.triangle_shapes,
             solids: self.solids,
             solid_shapes: self.solid_shapes,

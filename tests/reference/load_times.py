@@ -9,7 +9,7 @@
 Ours is a whole process: start, read, build the hierarchy, render one pixel, write it. Mitsuba's is `load_file` alone, in
 a process that has loaded its variant before. The runs of both alternate, each in a process of its own, so that what else
 the machine does falls on both; times are medians of wall time. Bytes per triangle are the peak memory of our process
-above that of an empty scene, less the pixels of its textures (as they are kept: 8 bits a channel, 16 in HDR images).
+above that of an empty scene, less the pixels of its textures (as many bytes a channel as in the file).
 
 Files of Mitsuba 0.5 and 0.6 are rewritten for Mitsuba 3 as in `agree.py`. The bar is a ratio of at most 1.5, and 250
 bytes per triangle where a scene has at least 100000 triangles: with fewer, files and buffers weigh more than the scene.
@@ -100,7 +100,7 @@ def texture_bytes(mi, path):
                 continue
             bitmap = mi.Bitmap(str(path.parent / name))
             channels = 1 if bitmap.channel_count() < 3 else 3
-            depth = min(bitmap.bytes_per_pixel() // bitmap.channel_count(), 2)
+            depth = bitmap.bytes_per_pixel() // bitmap.channel_count()
             total += bitmap.width() * bitmap.height() * channels * depth
     return total
 
