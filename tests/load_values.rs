@@ -4,8 +4,8 @@
 
 use glam::DVec3;
 use pathblend::bsdf::{
-    Bsdf, Conductor, Dielectric, Diffuse, Distribution, Mask, Phong, Plastic, RoughConductor, RoughDielectric,
-    RoughPlastic, Roughness,
+    Bsdf, Conductor, Dielectric, Diffuse, Distribution, Mask, Phong, Plastic, RoughCoat, RoughConductor,
+    RoughDielectric, RoughPlastic, Roughness,
 };
 use pathblend::camera::Projection;
 use pathblend::film::Filter;
@@ -76,8 +76,8 @@ fn layered_and_rough_models_have_mitsubas_defaults() {
     let (one, half) = (|| Colour::from(Spectrum::ONE), || Colour::from(Spectrum::grey(0.5)));
     let eta = 1.49 / 1.000277;
     assert_eq!(bsdfs("<bsdf type=\"plastic\"/>"), [Bsdf::Plastic(Plastic::new(eta, half(), one(), false))]);
-    let coat = (Distribution::Beckmann, 0.1, true);
-    let rough = Bsdf::RoughPlastic(Box::new(RoughPlastic::new(eta, coat, half(), one(), false)));
+    let coat = RoughCoat::new(eta, (Distribution::Beckmann, 0.1, true));
+    let rough = Bsdf::RoughPlastic(Box::new(RoughPlastic::new(coat, half(), one(), false)));
     assert_eq!(bsdfs("<bsdf type=\"roughplastic\"/>"), [rough]);
     let frosted = RoughDielectric {
         eta: 1.5046 / 1.000277,

@@ -127,7 +127,7 @@ impl Microfacet {
     #[inline]
     pub fn sample(&self, wi: DVec3, u: [f64; 2]) -> DVec3 {
         let h = match (self.visible, self.distribution) {
-            (true, Distribution::Ggx) => VisibleDisk::of(self.stretch(wi)).sample(u),
+            (true, Distribution::Ggx) => VisibleDisk::of(self.stretch(wi)).at(disk::sample(u)),
             (true, Distribution::Beckmann) => {
                 let slope = Slopes::of(self.stretch(wi)).sample(u);
                 DVec3::new(-slope.x, -slope.y, 1.0)
@@ -141,6 +141,12 @@ impl Microfacet {
             }
         };
         self.stretch(h).normalize()
+    }
+
+    /// [`Microfacet::sample`] of GGX's visible normals as a map from the unit disk: for many normals of one direction.
+    pub(super) fn seen_from(&self, wi: DVec3) -> impl Fn(DVec2) -> DVec3 {
+        let visible = VisibleDisk::of(self.stretch(wi));
+        move |point| self.stretch(visible.at(point)).normalize()
     }
 
     /// Density of [`Microfacet::sample`] per solid angle of the normal. For visible normals of Beckmann the exact
@@ -193,9 +199,9 @@ impl VisibleDisk {
         Self { axis, tangent, bitangent: axis.cross(tangent), share: 0.5 * (1.0 + axis.z) }
     }
 
+    /// The normal at the point `p` of the unit disk.
     #[inline]
-    fn sample(&self, u: [f64; 2]) -> DVec3 {
-        let p = disk::sample(u);
+    fn at(&self, p: DVec2) -> DVec3 {
         let bulge = (1.0 - p.x * p.x).max(0.0).sqrt();
         let y = (1.0 - self.share) * bulge + self.share * p.y;
         let z = (1.0 - p.x * p.x - y * y).max(0.0).sqrt();

@@ -3,9 +3,11 @@
 use super::microfacet::SMALLEST_ALPHA;
 use super::slopes::{Slopes, gaussian};
 use super::{Distribution, Evaluation, Microfacet, fresnel};
-use crate::math::SolidAnglePdf;
+use crate::math::{SolidAnglePdf, warp::disk};
 use crate::spectrum::Spectrum;
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+use std::sync::LazyLock;
 
 /// Entries of the table of transmittances, evenly spaced over the cosine.
 const ENTRIES: usize = 64;
@@ -19,24 +21,32 @@ pub struct RoughCoat {
     pub microfacet: Microfacet,
     /// Share of light that is refracted and not shadowed, by the cosine of incidence.
     transmittance: Box<[f64]>,
+    /// Share of diffuse light from inside that is reflected back.
+    internal_reflectance: f64,
 }
 
 impl RoughCoat {
-    /// Facets with roughness `alpha`; tabulates what passes.
+    /// Facets with roughness `alpha`; tabulates what passes, which takes milliseconds.
     pub fn new(eta: f64, (distribution, alpha, visible): (Distribution, f64, bool)) -> Self {
         let microfacet = Microfacet { distribution, alpha: DVec2::splat(alpha.max(SMALLEST_ALPHA)), visible };
-        let rule = Rule::new(32);
-        let passes = |i: usize| rule.share(&microfacet, entry(i), |wi, h| refracted(&microfacet, wi, h, eta));
-        Self { eta, microfacet, transmittance: (0..ENTRIES).map(passes).collect() }
+        let passes = |i| PASSING.share(&microfacet, entry(i), |wi, h| refracted(&microfacet, wi, h, eta));
+        let returns = |i| RETURNING.share(&microfacet, entry(i), |wi, h| reflected(&microfacet, wi, h, 1.0 / eta));
+        let table =
+            |share: &(dyn Fn(usize) -> f64 + Sync)| -> Vec<f64> { (0..ENTRIES).into_par_iter().map(share).collect() };
+        let weighted = table(&returns).into_iter().enumerate().map(|(i, share)| share * entry(i));
+        let internal_reflectance = 2.0 * weighted.sum::<f64>() / ENTRIES as f64;
+        Self { eta, microfacet, transmittance: table(&passes).into(), internal_reflectance }
+    }
+
+    /// Whether it is what [`RoughCoat::new`] makes of these.
+    pub fn is_of(&self, eta: f64, (distribution, alpha, visible): (Distribution, f64, bool)) -> bool {
+        let alpha = DVec2::splat(alpha.max(SMALLEST_ALPHA));
+        self.eta == eta && self.microfacet == Microfacet { distribution, alpha, visible }
     }
 
     /// Share of diffuse light from inside that is reflected back.
     pub fn internal_reflectance(&self) -> f64 {
-        // Total reflection has an edge, which takes more nodes.
-        let rule = Rule::new(128);
-        let back = |wi: DVec3, h: DVec3| reflected(&self.microfacet, wi, h, 1.0 / self.eta);
-        let share = |i: usize| rule.share(&self.microfacet, entry(i), back) * entry(i);
-        2.0 * (0..ENTRIES).map(share).sum::<f64>() / ENTRIES as f64
+        self.internal_reflectance
     }
 
     /// Share of the light at the positive cosine `cos` that passes.
@@ -99,6 +109,12 @@ fn refracted(microfacet: &Microfacet, wi: DVec3, h: DVec3, eta: f64) -> f64 {
     }
 }
 
+/// The rule for light from outside.
+static PASSING: LazyLock<Rule> = LazyLock::new(|| Rule::new(32));
+
+/// The rule for light from inside: total reflection has an edge, which takes more nodes.
+static RETURNING: LazyLock<Rule> = LazyLock::new(|| Rule::new(128));
+
 /// A rule of Gauss and Legendre on the unit square.
 struct Rule {
     /// Nodes and weights of one axis.
@@ -106,13 +122,17 @@ struct Rule {
     /// Slopes of a Beckmann surface across the plane of incidence, and weights, for the first half of the nodes: the
     /// facets on both sides of that plane do the same.
     across: Vec<(f64, f64)>,
+    /// Where the unit disk has the visible normals of GGX: for each node, its pairs with the first half of the nodes.
+    disk: Vec<DVec2>,
 }
 
 impl Rule {
     fn new(n: usize) -> Self {
         let nodes = gauss_legendre(n);
         let across = nodes[..n / 2].iter().map(|(v, weight)| (gaussian(*v), 2.0 * weight)).collect();
-        Self { nodes, across }
+        let pairs = nodes.iter().flat_map(|(u, _)| nodes[..n / 2].iter().map(|(v, _)| disk::sample([*v, *u])));
+        let disk = pairs.collect();
+        Self { nodes, across, disk }
     }
 
     /// Mean over the facets that are seen at the cosine `cos`.
@@ -121,18 +141,22 @@ impl Rule {
         let (cos, alpha) = (cos.max(1e-6), microfacet.alpha.x);
         let wi = DVec3::new((1.0 - cos * cos).max(0.0).sqrt(), 0.0, cos);
         let slopes = Slopes::of(DVec3::new(alpha * wi.x, 0.0, wi.z));
-        let inner = |u: f64| match visible.distribution {
-            Distribution::Ggx => {
-                let half = self.nodes[..self.across.len()].iter();
-                half.map(|(v, weight)| 2.0 * weight * of(wi, visible.sample(wi, [*v, u]))).sum::<f64>()
-            }
-            Distribution::Beckmann => {
-                let x = slopes.along(u);
-                let normal = |y: f64| DVec3::new(-alpha * x, -alpha * y, 1.0).normalize();
-                self.across.iter().map(|(y, weight)| weight * of(wi, normal(*y))).sum()
+        let seen = visible.seen_from(wi);
+        let inner = |u: f64, disk: &[DVec2]| -> f64 {
+            match visible.distribution {
+                Distribution::Ggx => {
+                    let half = self.nodes.iter().zip(disk);
+                    half.map(|((_, weight), point)| 2.0 * weight * of(wi, seen(*point))).sum()
+                }
+                Distribution::Beckmann => {
+                    let x = slopes.along(u);
+                    let normal = |y: f64| DVec3::new(-alpha * x, -alpha * y, 1.0).normalize();
+                    self.across.iter().map(|(y, weight)| weight * of(wi, normal(*y))).sum()
+                }
             }
         };
-        self.nodes.iter().map(|(u, weight)| weight * inner(*u)).sum()
+        let rows = self.nodes.iter().zip(self.disk.chunks(self.across.len()));
+        rows.map(|((u, weight), disk)| weight * inner(*u, disk)).sum()
     }
 }
 
@@ -148,7 +172,11 @@ fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
                 (before, value) = (value, ((2.0 * k - 1.0) * x * value - (k - 1.0) * before) / k);
             }
             slope = n as f64 * (x * value - before) / (x * x - 1.0);
-            x -= value / slope;
+            let next = x - value / slope;
+            if next == x {
+                break;
+            }
+            x = next;
         }
         (0.5 * (1.0 - x), 1.0 / ((1.0 - x * x) * slope * slope))
     };

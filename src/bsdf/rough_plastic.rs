@@ -1,7 +1,7 @@
 //! A diffuse base under a rough dielectric coat.
 
 use super::lobes::{choose, guess, letter, mean, share, unchoose};
-use super::{Distribution, Evaluation, Letter, RoughCoat, Scatter, Substrate};
+use super::{Evaluation, Letter, RoughCoat, Scatter, Substrate};
 use crate::math::{Row, warp::hemisphere};
 use crate::spectrum::Spectrum;
 use crate::texture::Colour;
@@ -19,16 +19,9 @@ pub struct RoughPlastic {
 }
 
 impl RoughPlastic {
-    /// With `eta` inside over outside, facets of some roughness, sampled visibly or not, over a base that reflects `diffuse_reflectance`.
-    pub fn new(
-        eta: f64,
-        coat: (Distribution, f64, bool),
-        diffuse_reflectance: Colour,
-        specular_reflectance: Colour,
-        nonlinear: bool,
-    ) -> Self {
-        let coat = RoughCoat::new(eta, coat);
-        let internal = coat.internal_reflectance();
+    /// A coat over a base that reflects `diffuse_reflectance`.
+    pub fn new(coat: RoughCoat, diffuse_reflectance: Colour, specular_reflectance: Colour, nonlinear: bool) -> Self {
+        let (internal, eta) = (coat.internal_reflectance(), coat.eta);
         let base = Substrate { reflectance: diffuse_reflectance, nonlinear, internal, eta };
         Self { base, coat, specular_reflectance }
     }

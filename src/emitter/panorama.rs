@@ -9,6 +9,7 @@ use crate::math::{Discrete, SolidAnglePdf};
 use crate::spectrum::Spectrum;
 use crate::texture::Picture;
 use glam::DVec3;
+use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -37,10 +38,12 @@ impl Panorama {
     pub fn new(picture: Arc<Picture>, scale: f64) -> Option<Self> {
         let blank = Discrete::new(&[1.0])?;
         let mut panorama = Self { picture, scale, rows: blank, columns: Vec::new(), integral: 0.0 };
-        let cells: Vec<_> = (0..panorama.row_count()).map(|row| panorama.weights(row)).collect();
-        let sums: Vec<f64> = cells.iter().map(|row| row.iter().sum()).collect();
-        panorama.rows = Discrete::new(&sums)?;
-        panorama.columns = cells.iter().map(|row| Discrete::new(row)).collect();
+        let cells = |row| {
+            let weights = panorama.weights(row);
+            (weights.iter().sum::<f64>(), Discrete::new(&weights))
+        };
+        let (sums, columns): (Vec<_>, _) = (0..panorama.row_count()).into_par_iter().map(cells).unzip();
+        (panorama.rows, panorama.columns) = (Discrete::new(&sums)?, columns);
         panorama.integral = sums.iter().sum();
         Some(panorama)
     }

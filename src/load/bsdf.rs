@@ -5,6 +5,8 @@ mod metals;
 mod microfacet;
 mod principled;
 
+pub(super) use microfacet::Coats;
+
 use super::attributes::Skin;
 use super::document::Element;
 use super::error::{LoadError, one_of};
@@ -12,8 +14,8 @@ use super::ior;
 use super::plugin::Plugin;
 use super::texture::Role;
 use crate::bsdf::{
-    Blend, Bsdf, Coating, Conductor, Dielectric, Diffuse, Mask, Phong, Plastic, RoughCoat, RoughConductor,
-    RoughDielectric, RoughPlastic, ThinDielectric,
+    Blend, Bsdf, Coating, Conductor, Dielectric, Diffuse, Mask, Phong, Plastic, RoughConductor, RoughDielectric,
+    RoughPlastic, ThinDielectric,
 };
 use crate::spectrum::Spectrum;
 use crate::texture::{Colour, Relief, ReliefMap};
@@ -140,7 +142,7 @@ impl Reader<'_> {
         let valid = |colour: &Spectrum| colour.is_valid();
         let absorption = plugin.colour("sigma_a")?.map(|c| c.check(valid, "values of at least 0")).transpose()?;
         let rough = plugin.kind == "roughcoating";
-        let rough = if rough { Some(RoughCoat::new(eta, microfacet::constant(plugin)?)) } else { None };
+        let rough = if rough { Some(microfacet::coat(plugin, eta)?) } else { None };
         let specular_reflectance = plugin.colour_texture("specular_reflectance", 1.0)?;
         let nested = self.one(plugin)?;
         if nested.transmits() {
@@ -292,8 +294,8 @@ fn plastic(plugin: &mut Plugin<'_>) -> Result<Plastic, LoadError> {
 fn rough_plastic(plugin: &mut Plugin<'_>) -> Result<RoughPlastic, LoadError> {
     let eta = relative_index(plugin, ior::POLYPROPYLENE)?;
     let (diffuse, specular) = reflectances(plugin)?;
-    let coat = microfacet::constant(plugin)?;
-    Ok(RoughPlastic::new(eta, coat, diffuse, specular, plugin.boolean("nonlinear")?))
+    let coat = microfacet::coat(plugin, eta)?;
+    Ok(RoughPlastic::new(coat, diffuse, specular, plugin.boolean("nonlinear")?))
 }
 
 /// Of the base and of the coat.

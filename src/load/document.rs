@@ -1,6 +1,7 @@
 //! A scene as a tree of elements, over all the files that it is made of, whose ids are known.
 
 use super::attributes;
+use super::bsdf::Coats;
 use super::error::{LoadError, one_of};
 use super::files::{At, Files};
 use super::picture::Pictures;
@@ -32,6 +33,8 @@ pub(super) struct Document<'a> {
     pub shows_attributes: bool,
     /// Images that its textures show.
     pub pictures: Pictures,
+    /// Rough coats of its scattering models.
+    pub coats: Coats,
     /// What was read over in files of Mitsuba 0.5 and 0.6, and what is hardly meant.
     pub warnings: RefCell<Vec<String>>,
 }
@@ -47,6 +50,7 @@ impl<'a> Document<'a> {
             read: RefCell::default(),
             shows_attributes: false,
             pictures: Pictures::default(),
+            coats: Coats::default(),
             warnings: RefCell::default(),
         };
         document.versions()?;

@@ -24,6 +24,7 @@ mod files;
 mod ior;
 mod legacy;
 mod mesh;
+mod mesh_file;
 mod obj;
 mod picture;
 mod plugin;
@@ -47,9 +48,9 @@ use crate::scene::{BsdfId, Builder, FilmSpec, Scene, SceneError};
 use bsdf::Model;
 use document::{Document, Element};
 use files::{At, Files};
-use glam::DAffine3;
 use plugin::Plugin;
-use shape::Form;
+use rayon::prelude::*;
+use shape::{Body, Form, Shape};
 use source::Source;
 use std::collections::{BTreeMap, HashMap};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -64,6 +65,9 @@ pub const LARGEST_DEPTH: usize = 4096;
 
 /// Most triangles of a scene: instances of instances would fill any memory.
 const MOST_TRIANGLES: usize = 1 << 28;
+
+/// Most shapes whose files are in memory at the same time, before the scene has taken them over.
+const AT_ONCE: usize = 32;
 
 const TAGS: [&str; 7] = ["default", "integrator", "sensor", "texture", "bsdf", "emitter", "shape"];
 
@@ -108,8 +112,13 @@ pub fn read(path: &Path, options: &Options) -> Result<Loaded, LoadError> {
     }
     let root = document.root();
     check_root(root)?;
-    for element in root.children() {
-        reader.element(element)?;
+    document.pictures.read_ahead(&document);
+    let elements: Vec<_> = root.children().collect();
+    for run in elements.chunk_by(|a, b| a.tag() == "shape" && b.tag() == "shape") {
+        match run[0].tag() {
+            "shape" => reader.shapes(run)?,
+            _ => reader.element(run[0])?,
+        }
     }
     reader.finish(root)
 }
@@ -137,7 +146,7 @@ struct Reader {
 }
 
 impl Reader {
-    /// Reads an element of the scene.
+    /// Reads an element of the scene that is no shape.
     fn element(&mut self, element: Element<'_>) -> Result<(), LoadError> {
         match element.tag() {
             "integrator" if self.max_depth.is_some() => Err(element.error("a scene can have one integrator only")),
@@ -162,7 +171,6 @@ impl Reader {
                 let add = |shine| self.builder.emitter(shine).map_err(|error| element.error(error.to_string()));
                 emitter::read(element)?.into_iter().try_for_each(add)
             }
-            "shape" => self.shape(element),
             // A sampler, film or filter out here has an id to be found by.
             "sampler" | "film" | "rfilter" => Ok(()),
             // Other programs keep their settings in files of Mitsuba 0.5 and 0.6.
@@ -178,23 +186,44 @@ impl Reader {
         }
     }
 
-    fn shape(&mut self, element: Element<'_>) -> Result<(), LoadError> {
-        for (member, to_world) in shape::members(element)? {
-            self.member(member, &to_world)?;
+    /// Reads shapes, whose files are read several at a time. Errors come in the order of the document all the same.
+    fn shapes<'a>(&mut self, elements: &[Element<'a>]) -> Result<(), LoadError> {
+        let members = |element: &Element<'a>| match shape::members(*element) {
+            Ok(members) => members.into_iter().map(Ok).collect(),
+            Err(error) => vec![Err(error)],
+        };
+        let mut members = elements.iter().flat_map(members);
+        loop {
+            let mut error = None;
+            let open = |member: Result<_, _>| member.and_then(|(element, outer)| shape::open(element, &outer));
+            let (opened, bodies): (Vec<_>, Vec<_>) = members
+                .by_ref()
+                .take(AT_ONCE)
+                .map_while(|member| open(member).map_err(|found| error = Some(found)).ok())
+                .unzip();
+            let ended = opened.is_empty();
+            let forms: Vec<_> = bodies.into_par_iter().map(Body::read).collect();
+            for (opened, form) in opened.into_iter().zip(forms) {
+                self.add_shape(opened.finish(form?)?)?;
+            }
+            match error {
+                Some(error) => return Err(error),
+                None if ended => return Ok(()),
+                None => {}
+            }
         }
-        Ok(())
     }
 
-    /// Adds a shape that `to_world` places once more.
-    fn member(&mut self, element: Element<'_>, to_world: &DAffine3) -> Result<(), LoadError> {
-        let shape = shape::read(element, to_world)?;
+    /// Adds a shape.
+    fn add_shape(&mut self, shape: Shape<'_>) -> Result<(), LoadError> {
+        let element = shape.element;
         let bsdf = match (&shape.skin, shape.bsdf) {
             // What shows the attributes of a mesh belongs to it alone.
             (Some(skin), Some(bsdf)) => self.add(bsdf::read(bsdf, Some(skin))?, shape.turned),
             _ => self.bsdf(shape.bsdf, shape.turned, shape.radiance.is_some())?,
         };
-        if let Some(bytes) = &shape.file {
-            self.builder.fingerprint(bytes);
+        if let Some(hash) = &shape.file {
+            self.builder.fingerprint(hash.as_bytes());
         }
         self.shapes += 1;
         if let Form::Mesh(mesh) = &shape.form {

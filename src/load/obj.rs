@@ -1,6 +1,7 @@
 //! Wavefront OBJ. Groups and materials are left aside: they do not change the shape, and Mitsuba does the same.
 
 use super::mesh::RawMesh;
+use foldhash::fast::RandomState;
 use glam::{DVec2, DVec3};
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -26,8 +27,12 @@ struct Lines {
 /// coordinates count from the top.
 pub(super) fn read(bytes: &[u8], flip_v: bool) -> Result<RawMesh, String> {
     let mut lines = Lines::default();
-    for (index, line) in joined(bytes).split(|byte| *byte == b'\n').enumerate() {
-        let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+    let text = joined(bytes);
+    let ends = memchr::memchr_iter(b'\n', &text).chain([text.len()]);
+    let mut start = 0;
+    for (index, end) in ends.enumerate() {
+        let mut words = Words(&text[start..end]);
+        start = end + 1;
         let located = |reason: String| format!("line {}: {reason}", index + 1);
         match words.next() {
             Some(b"v") => lines.positions.push(DVec3::from(numbers(words, 3).map_err(located)?)),
@@ -44,7 +49,7 @@ pub(super) fn read(bytes: &[u8], flip_v: bool) -> Result<RawMesh, String> {
 }
 
 impl Lines {
-    fn face<'w>(&mut self, words: impl Iterator<Item = &'w [u8]>, line: u32) -> Result<(), String> {
+    fn face(&mut self, words: Words<'_>, line: u32) -> Result<(), String> {
         let counts = [self.positions.len(), self.uvs.len(), self.normals.len()];
         let first = self.corners.len() as u32;
         for word in words {
@@ -66,7 +71,8 @@ impl Lines {
         let mut mesh = RawMesh::default();
         let used = |i: usize| self.corners.iter().any(|corner| corner[i] != NONE);
         let (mapped, smooth) = (used(1), used(2));
-        let mut known: HashMap<Corner, u32> = HashMap::with_capacity(self.positions.len());
+        let mut known: HashMap<Corner, u32, RandomState> =
+            HashMap::with_capacity_and_hasher(self.positions.len(), RandomState::default());
         for (triangle, line) in &self.triangles {
             let mut vertices = [0; 3];
             for (vertex, place) in vertices.iter_mut().zip(triangle) {
@@ -100,16 +106,32 @@ impl Lines {
     }
 }
 
+/// The words of a line.
+struct Words<'l>(&'l [u8]);
+
+impl<'l> Iterator for Words<'l> {
+    type Item = &'l [u8];
+
+    #[inline]
+    fn next(&mut self) -> Option<&'l [u8]> {
+        let line = self.0.trim_ascii_start();
+        let end = line.iter().position(u8::is_ascii_whitespace).unwrap_or(line.len());
+        let (word, rest) = line.split_at(end);
+        self.0 = rest;
+        Some(word).filter(|word| !word.is_empty())
+    }
+}
+
 /// The first three numbers of a line, which has at least `least`; missing ones are zero.
-fn numbers<'w>(mut words: impl Iterator<Item = &'w [u8]>, least: usize) -> Result<[f64; 3], String> {
+fn numbers(mut words: Words<'_>, least: usize) -> Result<[f64; 3], String> {
     let mut result = [0.0; 3];
     for (i, slot) in result.iter_mut().enumerate() {
         match words.next() {
             None if i < least => return Err(format!("it has fewer than {least} numbers")),
             None => break,
             Some(word) => {
-                let number = std::str::from_utf8(word).ok().and_then(|text| text.parse().ok());
-                *slot = number.ok_or_else(|| format!("`{}` is not a number", String::from_utf8_lossy(word)))?;
+                let number = fast_float2::parse(word);
+                *slot = number.map_err(|_| format!("`{}` is not a number", String::from_utf8_lossy(word)))?;
             }
         }
     }
@@ -123,20 +145,32 @@ fn corner(word: &[u8], counts: [usize; 3]) -> Option<Corner> {
         if part.is_empty() && i > 0 {
             continue;
         }
-        let number: i64 = std::str::from_utf8(part).ok()?.parse().ok()?;
-        let index = match number {
-            1.. => number - 1,
+        let index = match integer(part)? {
+            number @ 1.. => number - 1,
             0 => return None,
-            _ => (counts.get(i).copied()? as i64).checked_add(number)?,
+            number => (counts.get(i).copied()? as i64).checked_add(number)?,
         };
         *corner.get_mut(i)? = u32::try_from(index).ok().filter(|index| *index != NONE)?;
     }
     Some(corner)
 }
 
+/// A whole number of so few digits that it fits.
+#[inline]
+fn integer(word: &[u8]) -> Option<i64> {
+    let (sign, digits) = match word {
+        [b'-', digits @ ..] => (-1, digits),
+        [b'+', digits @ ..] => (1, digits),
+        digits => (1, digits),
+    };
+    let append = |number: i64, digit: &u8| digit.is_ascii_digit().then(|| 10 * number + i64::from(digit - b'0'));
+    let digits = Some(digits).filter(|digits| (1..=18).contains(&digits.len()))?;
+    digits.iter().try_fold(0, append).map(|number| sign * number)
+}
+
 /// The text with lines that end in a backslash joined to the next, at the same line numbers.
 fn joined(bytes: &[u8]) -> Cow<'_, [u8]> {
-    if !bytes.windows(2).any(|pair| pair == b"\\\n" || pair == b"\\\r") {
+    if memchr::memchr(b'\\', bytes).is_none() {
         return Cow::Borrowed(bytes);
     }
     let mut text = Vec::with_capacity(bytes.len());

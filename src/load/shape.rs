@@ -3,12 +3,11 @@
 use super::attributes::{Skin, shows};
 use super::document::Element;
 use super::error::LoadError;
-use super::mesh::{self, Facing, RawMesh};
+use super::mesh::{self, Facing};
+use super::mesh_file::MeshFile;
 use super::plugin::Plugin;
 use super::round;
-use super::source::read_bounded;
 use super::texture::Role;
-use super::{obj, ply, serialized};
 use crate::geometry::Solid;
 use crate::scene::Mesh;
 use crate::texture::Colour;
@@ -22,6 +21,7 @@ const FAR: f64 = 1e18;
 
 /// A shape of the scene file.
 pub(super) struct Shape<'a> {
+    pub element: Element<'a>,
     pub form: Form,
     /// Its scattering model, if it names one.
     pub bsdf: Option<Element<'a>>,
@@ -31,8 +31,38 @@ pub(super) struct Shape<'a> {
     pub radiance: Option<Colour>,
     /// The shape as its textures see it, where one of them shows an attribute.
     pub skin: Option<Skin>,
-    /// Bytes of the mesh file that it was read from.
-    pub file: Option<Vec<u8>>,
+    /// Fingerprint of the mesh file that it was read from.
+    pub file: Option<blake3::Hash>,
+}
+
+/// A shape whose form is known, and the rest not yet.
+pub(super) struct Opened<'a> {
+    plugin: Plugin<'a>,
+    turned: bool,
+}
+
+/// The form of a shape, or where it is to be read: what can be done for many shapes at the same time.
+pub(super) enum Body<'a> {
+    Form(Form, Option<Skin>),
+    File(MeshFile<'a>),
+}
+
+/// What has been read of a shape.
+pub(super) struct Read {
+    pub form: Form,
+    pub skin: Option<Skin>,
+    /// Fingerprint of the file that it was read from.
+    pub file: Option<blake3::Hash>,
+}
+
+impl Body<'_> {
+    /// Reads the file, if there is one.
+    pub fn read(self) -> Result<Read, LoadError> {
+        match self {
+            Self::Form(form, skin) => Ok(Read { form, skin, file: None }),
+            Self::File(file) => file.read(),
+        }
+    }
 }
 
 /// A shape in world space.
@@ -80,8 +110,8 @@ fn check_member(shape: Element<'_>) -> Result<(), LoadError> {
     }
 }
 
-/// Reads a shape and the mesh file that it names; `outer` places it once more.
-pub(super) fn read<'a>(element: Element<'a>, outer: &DAffine3) -> Result<Shape<'a>, LoadError> {
+/// Reads what makes the form of a shape; `outer` places it once more.
+pub(super) fn open<'a>(element: Element<'a>, outer: &DAffine3) -> Result<(Opened<'a>, Body<'a>), LoadError> {
     let mut plugin = Plugin::new(element)?;
     if !KINDS.contains(&plugin.kind) {
         return Err(plugin.unknown(&KINDS));
@@ -89,43 +119,48 @@ pub(super) fn read<'a>(element: Element<'a>, outer: &DAffine3) -> Result<Shape<'
     let (inner, transform) = plugin.placement()?;
     let to_world = *outer * inner;
     let flip_normals = plugin.boolean("flip_normals")?;
-    let (mut turned, mut file) = (false, None);
-    let mut skin = shows(element)?.then(|| Skin::bare(format!("this {}", plugin.kind)));
-    let mut form = match plugin.kind {
+    let mut turned = false;
+    let shows = shows(element)?;
+    let skin = shows.then(|| Skin::bare(format!("this {}", plugin.kind)));
+    let body = match plugin.kind {
         "sphere" | "disk" | "cylinder" => {
             let round = round::read(&mut plugin, &to_world, transform, flip_normals)?;
             turned = round.turned;
-            Form::Solid(round.solid)
+            Body::Form(Form::Solid(round.solid), skin)
         }
         kind => {
             let face_normals = plugin.boolean("face_normals")?;
-            Form::Mesh(match kind {
-                "rectangle" => mesh::rectangle().place_solid(&to_world, flip_normals),
-                "cube" => mesh::cube().place_solid(&to_world, flip_normals),
-                _ => {
-                    let mut read = mesh_file(&mut plugin, skin.is_some())?;
-                    file = Some(read.bytes);
-                    let attributes = std::mem::take(&mut read.raw.attributes);
-                    let mesh = read.raw.place(&to_world, Facing { face_normals, flip_normals });
-                    skin = skin.map(|_| Skin::of(format!("the mesh {}", read.name), &mesh, attributes));
-                    mesh
-                }
-            })
+            let facing = Facing { face_normals, flip_normals };
+            match kind {
+                "rectangle" => Body::Form(Form::Mesh(mesh::rectangle().place_solid(&to_world, flip_normals)), skin),
+                "cube" => Body::Form(Form::Mesh(mesh::cube().place_solid(&to_world, flip_normals)), skin),
+                _ => Body::File(MeshFile::of(&mut plugin, to_world, facing, shows)?),
+            }
         }
     };
-    if let Form::Mesh(mesh) = &mut form {
-        mesh.charted = skin.is_some();
+    Ok((Opened { plugin, turned }, body))
+}
+
+impl<'a> Opened<'a> {
+    /// Reads the rest of a shape.
+    pub fn finish(self, read: Read) -> Result<Shape<'a>, LoadError> {
+        let Self { mut plugin, turned } = self;
+        let Read { mut form, skin, file } = read;
+        let element = plugin.element;
+        if let Form::Mesh(mesh) = &mut form {
+            mesh.charted = skin.is_some();
+        }
+        check_size(&form, element)?;
+        let bsdf = plugin.object("bsdf")?;
+        let radiance = plugin.object("emitter")?.map(|emitter| area(emitter, skin.as_ref())).transpose()?;
+        plugin.finish()?;
+        if turned && radiance.is_some() {
+            let kind = element.required("type")?.text;
+            let message = format!("a {kind} that shines inwards is not supported; its normals must point outwards");
+            return Err(element.error(message));
+        }
+        Ok(Shape { element, form, bsdf, turned, radiance, skin, file })
     }
-    check_size(&form, element)?;
-    let bsdf = plugin.object("bsdf")?;
-    let radiance = plugin.object("emitter")?.map(|emitter| area(emitter, skin.as_ref())).transpose()?;
-    plugin.finish()?;
-    if turned && radiance.is_some() {
-        let kind = element.required("type")?.text;
-        let message = format!("a {kind} that shines inwards is not supported; its normals must point outwards");
-        return Err(element.error(message));
-    }
-    Ok(Shape { form, bsdf, turned, radiance, skin, file })
 }
 
 /// Reads the emitter of a shape.
@@ -142,43 +177,6 @@ fn area(element: Element<'_>, skin: Option<&Skin>) -> Result<Colour, LoadError> 
     };
     plugin.finish()?;
     Ok(radiance)
-}
-
-/// A mesh file.
-struct MeshFile<'a> {
-    name: &'a str,
-    raw: RawMesh,
-    bytes: Vec<u8>,
-}
-
-fn mesh_file<'a>(plugin: &mut Plugin<'a>, attributes: bool) -> Result<MeshFile<'a>, LoadError> {
-    let name = plugin.string("filename")?.ok_or_else(|| plugin.lacks("filename"))?.value;
-    let path = name.source.beside(name.text);
-    let bytes = read_bounded(&path, u64::MAX).map_err(|reason| {
-        let looked = name.source.looked(name.text);
-        name.error(format!("cannot read the mesh {}: {reason}{looked}", path.display()))
-    })?;
-    let raw = match plugin.kind {
-        "obj" => {
-            // Says how Mitsuba 0.6 groups what is one mesh here.
-            plugin.ignore(&["collapse"]);
-            obj::read(&bytes, plugin.boolean_or("flip_tex_coords", true)?)
-        }
-        "ply" => ply::read(&bytes, plugin.boolean("flip_tex_coords")?, attributes),
-        _ => {
-            let index = plugin.integer("shape_index")?;
-            let index =
-                index.map(|index| index.check(|index| *index >= 0, "a whole number of at least 0")).transpose()?;
-            serialized::read(&bytes, index.unwrap_or(0) as usize)
-        }
-    };
-    let raw = raw.map_err(|reason| name.error(format!("the mesh {} is broken: {reason}", path.display())))?;
-    let finite = raw.positions.iter().chain(&raw.normals).all(|v| v.is_finite());
-    if !finite || !raw.uvs.iter().all(|uv| uv.is_finite()) {
-        let message = format!("the mesh {} has a coordinate that is not a finite number", path.display());
-        return Err(name.error(message));
-    }
-    Ok(MeshFile { name: name.text, raw, bytes })
 }
 
 fn check_size(form: &Form, element: Element<'_>) -> Result<(), LoadError> {

@@ -4,6 +4,7 @@ use super::error::LoadError;
 use super::source::Source;
 use crate::spectrum::Spectrum;
 use glam::DVec3;
+use std::path::PathBuf;
 
 /// Most characters of a value that a message shows.
 const SHOWN: usize = 60;
@@ -17,6 +18,11 @@ pub(super) struct Text<'a> {
 }
 
 impl Text<'_> {
+    /// The file that this text names.
+    pub fn path(&self) -> PathBuf {
+        self.source.beside(self.text)
+    }
+
     /// An error at this text.
     pub fn error(&self, message: impl Into<String>) -> LoadError {
         self.source.error(self.offset, message)

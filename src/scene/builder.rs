@@ -1,15 +1,16 @@
 //! Assembles a [`Scene`] from what a file says.
 
-use super::{BsdfId, EmitterId, Face, Scene, Shape};
+use super::{BsdfId, EmitterId, Scene, Shape};
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::emitter::{Area, Backdrop, Constant, Directional, Emitter, Environment, Point, Reach, Spot, Surface};
 use crate::film::Filter;
-use crate::geometry::{Bvh, Solid, geometric_normal, offset};
+use crate::geometry::{Bvh, Solid, geometric_normal};
 use crate::math::Discrete;
 use crate::spectrum::Spectrum;
 use crate::texture::{Colour, Relief, attribute};
 use glam::{DVec2, DVec3, Vec2, Vec3};
+use rayon::prelude::*;
 use thiserror::Error;
 
 /// A triangle mesh in world space.
@@ -90,6 +91,13 @@ pub enum SceneError {
     NoArea,
 }
 
+/// What the points of a shape come with: see [`Shape`].
+struct Given {
+    mapped: bool,
+    smooth: bool,
+    chart: Option<u32>,
+}
+
 /// Collects the parts of a scene.
 #[derive(Default)]
 pub struct Builder {
@@ -136,7 +144,7 @@ impl Builder {
         if let Some(index) = mesh.triangles.iter().flatten().find(|i| **i as usize >= mesh.positions.len()) {
             return Err(SceneError::VertexOutOfRange { index: *index, vertices: mesh.positions.len() });
         }
-        // Light shines on the side that the vertex normals point to, as `Builder::face` has it.
+        // Light shines on the side that the vertex normals point to, as `Builder::face_normal` has it.
         let corners = |(index, triangle): (usize, &[u32; 3])| {
             let [a, b, c] = triangle.map(|i| mesh.positions[i as usize].as_dvec3());
             let normals = triangle.iter().filter_map(|i| mesh.normals.get(*i as usize));
@@ -153,8 +161,12 @@ impl Builder {
             }
         };
         let surface = |()| Surface::triangles(mesh.triangles.iter().enumerate().map(corners));
-        let chart = mesh.charted.then_some(self.triangles.len() as u32);
-        let shape = self.shape(bsdf, radiance, !mesh.uvs.is_empty(), chart, surface)?;
+        let given = Given {
+            mapped: !mesh.uvs.is_empty(),
+            smooth: !mesh.normals.is_empty(),
+            chart: mesh.charted.then_some(self.triangles.len() as u32),
+        };
+        let shape = self.shape(bsdf, radiance, given, surface)?;
         let base = self.vertices.len() as u32;
         self.triangles.extend(mesh.triangles.iter().map(|t| t.map(|i| i + base)));
         self.triangle_shapes.resize(self.triangles.len(), shape);
@@ -169,7 +181,8 @@ impl Builder {
     /// Adds a sphere or a disk, which shines with `radiance` where one is given.
     pub fn solid(&mut self, solid: Solid, bsdf: BsdfId, radiance: Option<Colour>) -> Result<(), SceneError> {
         let surface = |()| Some(Surface::Solid(solid)).filter(|surface| surface.area() > 0.0);
-        let shape = self.shape(bsdf, radiance, true, None, surface)?;
+        let given = Given { mapped: true, smooth: false, chart: None };
+        let shape = self.shape(bsdf, radiance, given, surface)?;
         self.solids.push(solid);
         self.solid_shapes.push(shape);
         Ok(())
@@ -179,8 +192,7 @@ impl Builder {
         &mut self,
         bsdf: BsdfId,
         radiance: Option<Colour>,
-        mapped: bool,
-        chart: Option<u32>,
+        given: Given,
         surface: impl FnOnce(()) -> Option<Surface>,
     ) -> Result<u32, SceneError> {
         let model = &self.bsdfs[bsdf.0 as usize];
@@ -195,7 +207,8 @@ impl Builder {
             }
             None => None,
         };
-        self.shapes.push(Shape { bsdf, emitter, textured, oriented, mapped, chart });
+        let Given { mapped, smooth, chart } = given;
+        self.shapes.push(Shape { bsdf, emitter, textured, oriented, mapped, chart, smooth });
         Ok(self.shapes.len() as u32 - 1)
     }
 
@@ -247,21 +260,17 @@ impl Builder {
     }
 
     /// Triangles without area have no normal; no ray hits them.
-    fn face(&self, triangle: &[u32; 3]) -> Face {
+    fn face_normal(&self, triangle: &[u32; 3]) -> DVec3 {
         let [a, b, c] = triangle.map(|i| self.vertices[i as usize].as_dvec3());
         let towards: Vec3 = triangle.iter().map(|i| self.normals[*i as usize]).sum();
         let normal = geometric_normal(a, b, c).unwrap_or(DVec3::Z);
-        Face {
-            normal: if normal.dot(towards.as_dvec3()) < 0.0 { -normal } else { normal },
-            offset: offset::of_triangle(a, b, c),
-            smooth: triangle.iter().any(|i| self.normals[*i as usize] != Vec3::ZERO),
-        }
+        if normal.dot(towards.as_dvec3()) < 0.0 { -normal } else { normal }
     }
 
     /// The scene as seen by `camera`. Builds the acceleration structure.
     pub fn build(mut self, camera: Camera, film: FilmSpec, max_depth: usize) -> Result<Scene, SceneError> {
         let bvh = Bvh::build(&self.vertices, &self.triangles, &self.solids);
-        let faces = self.triangles.iter().map(|triangle| self.face(triangle)).collect();
+        let face_normals = self.triangles.par_iter().map(|triangle| self.face_normal(triangle)).collect();
         let (center, radius) = bvh.bounds().bounding_sphere();
         // A margin for rounding; an empty scene has an environment too.
         let radius = if radius > 0.0 { radius * (1.0 + 1e-6) } else { 1.0 };
@@ -277,7 +286,7 @@ impl Builder {
             normals: self.normals,
             uvs: self.uvs,
             triangles: self.triangles,
-            faces,
+            face_normals,
             triangle_shapes: self.triangle_shapes,
             solids: self.solids,
             solid_shapes: self.solid_shapes,

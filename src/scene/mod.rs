@@ -13,7 +13,7 @@ pub use surface::Surface;
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::emitter::{Emitter, Start};
-use crate::geometry::{Bvh, NO_TRIANGLE, Primitive, Ray, Solid, SurfacePoint};
+use crate::geometry::{Bvh, NO_TRIANGLE, Primitive, Ray, Solid, SurfacePoint, offset};
 use crate::math::{AreaPdf, Discrete, Frame, Row};
 use crate::texture::{Relief, attribute};
 use glam::{DVec2, DVec3, Vec2, Vec3};
@@ -39,15 +39,6 @@ struct Shape {
     mapped: bool,
     /// Its first triangle, where textures are looked up by faces.
     chart: Option<u32>,
-}
-
-/// What every point of a triangle shares.
-#[derive(Clone, Copy, Debug)]
-struct Face {
-    /// Unit normal, on the side that the vertex normals point to; without these counter-clockwise.
-    normal: DVec3,
-    /// Distance by which rays are started off the triangle.
-    offset: f64,
     /// Whether its vertices have normals.
     smooth: bool,
 }
@@ -70,7 +61,8 @@ pub struct Scene {
     /// Texture coordinates per vertex; zero where a mesh has none.
     uvs: Vec<Vec2>,
     triangles: Vec<[u32; 3]>,
-    faces: Vec<Face>,
+    /// Unit normals per triangle, on the side that the vertex normals point to; without these counter-clockwise.
+    face_normals: Vec<DVec3>,
     triangle_shapes: Vec<u32>,
     solids: Vec<Solid>,
     solid_shapes: Vec<u32>,
@@ -100,15 +92,15 @@ impl Scene {
         let corners = self.triangles[index];
         let [a, b, c] = corners.map(|i| self.vertices[i as usize].as_dvec3());
         let w = 1.0 - u - v;
-        let Face { normal, offset, smooth } = self.faces[index];
-        let (geometric, shading) = if smooth {
+        let normal = self.face_normals[index];
+        let shape = self.shapes[self.triangle_shapes[index] as usize];
+        let Shape { bsdf, emitter, textured, oriented, mapped, chart, smooth } = shape;
+        let shading = if smooth {
             let [na, nb, nc] = corners.map(|i| self.normals[i as usize].as_dvec3());
-            (normal, (na * w + nb * u + nc * v).normalize_or(normal))
+            (na * w + nb * u + nc * v).normalize_or(normal)
         } else {
-            (normal, normal)
+            normal
         };
-        let Shape { bsdf, emitter, textured, oriented, mapped, chart } =
-            self.shapes[self.triangle_shapes[index] as usize];
         let (mut uv, mut frame, mut up) = (DVec2::ZERO, Frame::around(shading), DVec3::Z);
         if textured {
             // Without texture coordinates, barycentric ones stand in, as in Mitsuba.
@@ -127,7 +119,8 @@ impl Scene {
             }
         }
         let (position, triangle) = (a * w + b * u + c * v, index as u32);
-        Surface { position, geometric, frame, up, uv, bsdf, emitter, offset, triangle }
+        let offset = offset::of_triangle(a, b, c);
+        Surface { position, geometric: normal, frame, up, uv, bsdf, emitter, offset, triangle }
     }
 
     /// The shading frame where it has to follow the texture coordinates, and `normal` in it. `at` are the place where

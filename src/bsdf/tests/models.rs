@@ -65,8 +65,8 @@ fn plastic(eta: f64, nonlinear: bool) -> Bsdf {
 }
 
 fn rough_plastic(distribution: Distribution, alpha: f64, nonlinear: bool) -> Bsdf {
-    let coat = (distribution, alpha, true);
-    Bsdf::RoughPlastic(Box::new(RoughPlastic::new(1.5, coat, colour(0.2, 0.5, 0.8), colour(1.0, 0.9, 0.8), nonlinear)))
+    let coat = RoughCoat::new(1.5, (distribution, alpha, true));
+    Bsdf::RoughPlastic(Box::new(RoughPlastic::new(coat, colour(0.2, 0.5, 0.8), colour(1.0, 0.9, 0.8), nonlinear)))
 }
 
 fn phong(exponent: f64) -> Bsdf {

@@ -12,6 +12,7 @@ use crate::math::warp;
 use crate::spectrum::Spectrum;
 use crate::texture::{Picture, Texels};
 use glam::DVec3;
+use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;
 
@@ -58,19 +59,19 @@ impl Sky {
     /// The sky without the sun, `scale` times as bright.
     pub fn image(&self, scale: f64) -> Option<Panorama> {
         let dome = hosek::Dome::new(self.turbidity, self.albedo, FRAC_PI_2 - self.zenith());
-        let mut samples = Vec::with_capacity(3 * SIZE[0] * SIZE[1]);
-        for row in 0..SIZE[1] {
+        let around = |column| (TAU * (column as f64 + 0.5) / SIZE[0] as f64).sin_cos();
+        let around: Vec<_> = (0..SIZE[0]).map(around).collect();
+        let row = |row| {
             let zenith = PI * row as f64 / (SIZE[1] - 1) as f64 / self.stretch;
             let (sin, cos) = zenith.sin_cos();
-            for column in 0..SIZE[0] {
-                let (x, z) = (TAU * (column as f64 + 0.5) / SIZE[0] as f64).sin_cos();
-                let direction = DVec3::new(sin * x, cos, -sin * z);
-                let above = zenith <= FRAC_PI_2;
-                let gamma = direction.angle_between(self.towards);
-                let radiance = if above { dome.radiance(cos, gamma) } else { Spectrum::BLACK };
-                samples.extend(radiance.to_rgb().map(|channel| channel as f32));
-            }
-        }
+            let (dome, above) = (&dome, zenith <= FRAC_PI_2);
+            let radiance = move |(x, z): &(f64, f64)| match above {
+                true => dome.radiance(cos, DVec3::new(sin * x, cos, -sin * z).angle_between(self.towards)),
+                false => Spectrum::BLACK,
+            };
+            around.iter().flat_map(move |turn| radiance(turn).to_rgb().map(|channel| channel as f32))
+        };
+        let samples = (0..SIZE[1]).into_par_iter().flat_map_iter(row).collect();
         Panorama::new(Arc::new(Picture::new(SIZE, Texels::Floats(samples))?), scale)
     }
 

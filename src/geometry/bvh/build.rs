@@ -6,11 +6,11 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::PlocBuilder;
+use rayon::prelude::*;
 
 use super::collapse::{Primitives, collapse};
 use super::frame::Frame;
 use super::groups::Groups;
-use super::packet::Packet;
 use super::traverse::FLAT_PACKETS;
 use super::{Bvh, Dropped};
 use crate::geometry::offset::cross;
@@ -25,9 +25,10 @@ const LOOSE_SOLIDS: usize = 4;
 /// See [`Bvh::build`].
 pub fn build(vertices: &[Vec3], triangles: &[[u32; 3]], solids: &[Solid]) -> Bvh {
     let mut dropped = Dropped::default();
-    let kept: Vec<(u32, [Vec3; 3])> = (0u32..)
+    let kept: Vec<u32> = (0u32..)
         .zip(triangles)
-        .filter_map(|(id, indices)| Some((id, checked_triangle(vertices, *indices, &mut dropped)?)))
+        .filter(|(_, indices)| is_sound(vertices, **indices, &mut dropped))
+        .map(|(id, _)| id)
         .collect();
     let kept_solids: Vec<u32> = (0u32..)
         .zip(solids)
@@ -39,43 +40,48 @@ pub fn build(vertices: &[Vec3], triangles: &[[u32; 3]], solids: &[Solid]) -> Bvh
         .map(|(id, _)| id)
         .collect();
 
-    let corners = kept.iter().flat_map(|(_, corners)| corners);
+    let corners = kept.iter().flat_map(|id| triangles[*id as usize]).map(|index| vertices[index as usize]);
     let meshes = corners.fold(Bounds::EMPTY, |bounds, corner| bounds.including(corner.as_dvec3()));
     let bounds = kept_solids.iter().fold(meshes, |bounds, id| bounds.union(solids[*id as usize].bounds()));
     let frame = Frame::new(meshes, bounds);
-
-    // Exact, by the choice of the frame.
-    let to_local = |corner: Vec3| frame.to_local(corner.as_dvec3()).as_vec3();
-    let local: Vec<(u32, [Vec3; 3])> = kept.into_iter().map(|(id, corners)| (id, corners.map(to_local))).collect();
-    let solids = solids.to_vec();
-    if local.len() <= 8 * FLAT_PACKETS && kept_solids.len() <= LOOSE_SOLIDS {
-        let packets = local.chunks(8).map(Packet::new).collect();
+    let primitives = Primitives { frame, vertices, indices: triangles, triangles: &kept, solids: &kept_solids };
+    if kept.len() <= 8 * FLAT_PACKETS && kept_solids.len() <= LOOSE_SOLIDS {
+        let numbers: Vec<u32> = (0..kept.len() as u32).collect();
+        let packets = numbers.chunks(8).map(|numbers| primitives.packet(numbers)).collect();
+        let solids = solids.to_vec();
         return Bvh { frame, bounds, dropped, nodes: Vec::new(), packets, solids, loose: kept_solids, stack: 0 };
     }
-    let mut boxes: Vec<Aabb> = local.iter().map(|(_, corners)| triangle_box(corners)).collect();
-    boxes.extend(kept_solids.iter().map(|id| solid_box(&solids[*id as usize], &frame)));
+    let count = kept.len();
+    let bounding = |i: usize| match i.checked_sub(count) {
+        None => triangle_box(&primitives.corners(i)),
+        Some(solid) => solid_box(&solids[kept_solids[solid] as usize], &frame),
+    };
+    let boxes: Vec<Aabb> = (0..count + kept_solids.len()).into_par_iter().map(bounding).collect();
     let groups = Groups::of_equal(&boxes);
-    let tree = binary(&groups.firsts().map(|first| boxes[first as usize]).collect::<Vec<_>>());
-    let wide = collapse(&tree, &Primitives { boxes: &boxes, groups: &groups, triangles: &local, solids: &kept_solids });
-    let stack = 7 * wide.depth + 1;
+    let tree = match groups.len() == boxes.len() {
+        true => binary(&boxes),
+        false => binary(&groups.firsts().map(|first| boxes[first as usize]).collect::<Vec<_>>()),
+    };
+    // Sets the bound on the memory that a scene takes to load: what is not needed again goes before more is made.
+    drop(boxes);
+    let wide = collapse(&tree, &groups, &primitives, bounding);
+    let (stack, solids) = (7 * wide.depth + 1, solids.to_vec());
     Bvh { frame, bounds, dropped, nodes: wide.nodes, packets: wide.packets, solids, loose: Vec::new(), stack }
 }
 
-/// The corners, unless they are to be dropped, which is counted.
-fn checked_triangle(vertices: &[Vec3], indices: [u32; 3], dropped: &mut Dropped) -> Option<[Vec3; 3]> {
+/// Whether a triangle can be hit; if not, it is counted.
+fn is_sound(vertices: &[Vec3], indices: [u32; 3], dropped: &mut Dropped) -> bool {
     // Written so that NaN fails.
     let sound = |v: &&Vec3| v.abs().cmple(Vec3::splat(LARGEST as f32)).all();
     let corner = |i: usize| vertices.get(indices[i] as usize).filter(sound).copied();
     let (Some(a), Some(b), Some(c)) = (corner(0), corner(1), corner(2)) else {
         dropped.invalid += 1;
-        return None;
+        return false;
     };
     let [a64, b64, c64] = [a, b, c].map(Vec3::as_dvec3);
-    if DVec3::from(cross((b64 - a64).to_array(), (c64 - a64).to_array())) == DVec3::ZERO {
-        dropped.degenerate += 1;
-        return None;
-    }
-    Some([a, b, c])
+    let flat = DVec3::from(cross((b64 - a64).to_array(), (c64 - a64).to_array())) == DVec3::ZERO;
+    dropped.degenerate += usize::from(flat);
+    !flat
 }
 
 fn triangle_box([a, b, c]: &[Vec3; 3]) -> Aabb {

@@ -8,6 +8,7 @@ use glam::Vec3;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 
+use super::frame::Frame;
 use super::groups::Groups;
 use super::packet::Packet;
 use super::traverse::MAX_DEPTH;
@@ -21,12 +22,14 @@ const PLANNED_DEPTH: usize = MAX_DEPTH - 11;
 
 /// What is in the hierarchy. Primitives are numbered with the triangles first.
 pub struct Primitives<'a> {
-    /// One box per primitive, in local units.
-    pub boxes: &'a [Aabb],
-    /// What the leaves of the binary hierarchy stand for.
-    pub groups: &'a Groups,
-    /// The caller's index and the corners in local units.
-    pub triangles: &'a [(u32, [Vec3; 3])],
+    /// From the caller's coordinates to local ones.
+    pub frame: Frame,
+    /// The caller's vertices.
+    pub vertices: &'a [Vec3],
+    /// The vertices of all of the caller's triangles.
+    pub indices: &'a [[u32; 3]],
+    /// The caller's index.
+    pub triangles: &'a [u32],
     /// The caller's index.
     pub solids: &'a [u32],
 }
@@ -35,6 +38,18 @@ impl Primitives<'_> {
     /// True if there is no solid among them.
     fn all_triangles(&self, list: &[u32]) -> bool {
         list.iter().all(|i| (*i as usize) < self.triangles.len())
+    }
+
+    /// The corners of a triangle in local units: exact, by the choice of the frame.
+    pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
+        let corners = self.indices[self.triangles[triangle] as usize].map(|index| self.vertices[index as usize]);
+        corners.map(|corner| self.frame.to_local(corner.as_dvec3()).as_vec3())
+    }
+
+    /// A packet of triangles.
+    pub fn packet(&self, list: &[u32]) -> Packet {
+        let triangle = |i: &u32| (self.triangles[*i as usize], self.corners(*i as usize));
+        Packet::new(&list.iter().map(triangle).collect::<Vec<_>>())
     }
 }
 
@@ -47,89 +62,89 @@ pub struct Wide {
     pub depth: usize,
 }
 
-/// Collapses `tree`.
-pub fn collapse(tree: &Bvh2, primitives: &Primitives<'_>) -> Wide {
-    let mut emitter = Emitter { tree, primitives, plans: plan(tree, primitives), wide: Wide::default() };
-    if !primitives.boxes.is_empty() {
+/// Collapses `tree`, whose leaves stand for the `groups` of `primitives` with boxes `bounds`.
+pub fn collapse(tree: &Bvh2, groups: &Groups, primitives: &Primitives<'_>, bounds: impl Fn(usize) -> Aabb) -> Wide {
+    let splits = plan(tree, groups, primitives);
+    let mut emitter = Emitter { tree, groups, primitives, bounds, splits, wide: Wide::default() };
+    if !tree.nodes.is_empty() {
         let roots = emitter.forest(0);
         emitter.node(&roots, 1);
     }
     emitter.wide
 }
 
-/// The best way to represent one subtree.
-#[derive(Clone, Default)]
+/// The best way to represent one subtree. For at most i + 1 roots: how many of them go to the first child, or 0 if i
+/// roots are as good. The first entry is 1 for a node, 0 for a leaf.
+type Split = [u8; 8];
+
+/// What the best way costs.
 struct Plan {
     /// Least cost with at most i + 1 roots.
     cost: [f32; 7],
-    /// For at most i + 1 roots: how many of them go to the first child, or 0 if i roots are as good. The first entry
-    /// is 1 for a node, 0 for a leaf.
-    split: [u8; 8],
     /// Triangles below, or too many for a packet as soon as there is a solid.
     triangles: u32,
 }
 
-/// Children first; an explicit stack, since a chain may be as deep as the scene is large.
-fn plan(tree: &Bvh2, primitives: &Primitives<'_>) -> Vec<Plan> {
-    let mut plans = vec![Plan::default(); tree.nodes.len()];
-    let mut order = Vec::with_capacity(tree.nodes.len());
-    let mut stack = vec![0];
-    while let Some(index) = stack.pop().filter(|i| *i < tree.nodes.len()) {
-        order.push(index);
-        if !tree.nodes[index].is_leaf() {
-            let first = tree.nodes[index].first_index as usize;
-            stack.extend([first, first + 1]);
+/// Children first; with explicit stacks, since a chain may be as deep as the scene is large.
+fn plan(tree: &Bvh2, groups: &Groups, primitives: &Primitives<'_>) -> Vec<Split> {
+    let mut splits = vec![[0; 8]; tree.nodes.len()];
+    // Those of finished subtrees whose parents are not finished.
+    let mut plans = Vec::new();
+    let mut open = vec![(0, false)];
+    while let Some((index, entered)) = open.pop().filter(|(index, _)| *index < tree.nodes.len()) {
+        let node = &tree.nodes[index];
+        let (area, first) = (node.aabb().half_area(), node.first_index as usize);
+        if node.is_leaf() {
+            let group = groups.members(tree.primitive_indices[first]);
+            let triangles = if primitives.all_triangles(group) { group.len() as u32 } else { 9 };
+            plans.push(Plan { cost: [LEAF_COST * area; 7], triangles });
+        } else if !entered {
+            open.extend([(index, true), (first + 1, false), (first, false)]);
+        } else if let (Some(right), Some(left)) = (plans.pop(), plans.pop()) {
+            let (plan, split) = join(&left, &right, area);
+            splits[index] = split;
+            plans.push(plan);
         }
     }
-    for index in order.into_iter().rev() {
-        let node = &tree.nodes[index];
-        let leaf_cost = LEAF_COST * node.aabb().half_area();
-        plans[index] = if node.is_leaf() {
-            let group = primitives.groups.members(tree.primitive_indices[node.first_index as usize]);
-            let triangles = if primitives.all_triangles(group) { group.len() as u32 } else { 9 };
-            Plan { cost: [leaf_cost; 7], split: [0; 8], triangles }
-        } else {
-            let first = node.first_index as usize;
-            join(&plans[first], &plans[first + 1], node.aabb().half_area(), leaf_cost)
-        };
-    }
-    plans
+    splits
 }
 
 /// The plan of a node from those of its two children.
-fn join(left: &Plan, right: &Plan, node_cost: f32, leaf_cost: f32) -> Plan {
+fn join(left: &Plan, right: &Plan, area: f32) -> (Plan, Split) {
     let triangles = left.triangles.saturating_add(right.triangles);
-    let mut plan = Plan { triangles, ..Plan::default() };
+    let (mut plan, mut split) = (Plan { cost: [0.0; 7], triangles }, [0; 8]);
     let mut distributed = [f32::INFINITY; 8];
     for roots in 2..=8 {
         for first in 1..roots {
             let cost = left.cost[first - 1] + right.cost[roots - first - 1];
             if cost < distributed[roots - 1] {
                 distributed[roots - 1] = cost;
-                plan.split[roots - 1] = first as u8;
+                split[roots - 1] = first as u8;
             }
         }
     }
-    let as_node = node_cost + distributed[7];
-    let as_leaf = if triangles <= 8 { leaf_cost } else { f32::INFINITY };
-    plan.split[0] = u8::from(as_node < as_leaf || triangles > 8);
+    let as_node = area + distributed[7];
+    let as_leaf = if triangles <= 8 { LEAF_COST * area } else { f32::INFINITY };
+    split[0] = u8::from(as_node < as_leaf || triangles > 8);
     plan.cost[0] = as_node.min(as_leaf);
     for roots in 2..=7 {
         if plan.cost[roots - 2] <= distributed[roots - 1] {
             plan.cost[roots - 1] = plan.cost[roots - 2];
-            plan.split[roots - 1] = 0;
+            split[roots - 1] = 0;
         } else {
             plan.cost[roots - 1] = distributed[roots - 1];
         }
     }
-    plan
+    (plan, split)
 }
 
 /// Writes nodes and packets in the order of a depth-first walk.
-struct Emitter<'a> {
+struct Emitter<'a, B> {
     tree: &'a Bvh2,
+    groups: &'a Groups,
     primitives: &'a Primitives<'a>,
-    plans: Vec<Plan>,
+    bounds: B,
+    splits: Vec<Split>,
     wide: Wide,
 }
 
@@ -141,10 +156,10 @@ enum Root {
     List(Vec<u32>),
 }
 
-impl Emitter<'_> {
+impl<B: Fn(usize) -> Aabb> Emitter<'_, B> {
     /// The up to eight children that the plan gives a subtree; a leaf is its own only child.
     fn forest(&self, index: usize) -> Vec<Root> {
-        if self.plans[index].split[0] == 0 {
+        if self.splits[index][0] == 0 {
             return vec![Root::Subtree(index)];
         }
         let mut roots = Vec::with_capacity(8);
@@ -153,9 +168,9 @@ impl Emitter<'_> {
             let child = self.tree.nodes[index].first_index as usize;
             open.extend([(child + 1, count - usize::from(first)), (child, usize::from(first))]);
         };
-        split(&mut open, index, 8, self.plans[index].split[7]);
+        split(&mut open, index, 8, self.splits[index][7]);
         while let Some((index, count)) = open.pop() {
-            match self.plans[index].split[count - 1] {
+            match self.splits[index][count - 1] {
                 _ if count == 1 => roots.push(Root::Subtree(index)),
                 0 => open.push((index, count - 1)),
                 first => split(&mut open, index, count, first),
@@ -179,7 +194,7 @@ impl Emitter<'_> {
         let (child, bounds) = match root {
             Root::Subtree(index) => {
                 let bounds = *self.tree.nodes[*index].aabb();
-                let child = if self.plans[*index].split[0] == 1 && level < PLANNED_DEPTH {
+                let child = if self.splits[*index][0] == 1 && level < PLANNED_DEPTH {
                     self.node(&self.forest(*index), level + 1)
                 } else {
                     self.spread(&self.below(*index), level)
@@ -187,7 +202,7 @@ impl Emitter<'_> {
                 (child, bounds)
             }
             Root::List(list) => {
-                let boxes = list.iter().map(|i| self.primitives.boxes[*i as usize]);
+                let boxes = list.iter().map(|i| (self.bounds)(*i as usize));
                 let bounds = boxes.reduce(|a, b| a.union(&b)).unwrap_or(Aabb::INVALID);
                 (self.spread(list, level), bounds)
             }
@@ -201,7 +216,7 @@ impl Emitter<'_> {
         while let Some(node) = open.pop().map(|i| &self.tree.nodes[i]) {
             let first = node.first_index as usize;
             if node.is_leaf() {
-                found.extend(self.primitives.groups.members(self.tree.primitive_indices[first]));
+                found.extend(self.groups.members(self.tree.primitive_indices[first]));
             } else {
                 open.extend([first + 1, first]);
             }
@@ -215,8 +230,7 @@ impl Emitter<'_> {
         if let Some(solid) = list.first().and_then(|i| (*i as usize).checked_sub(count)) {
             return Child::solid(self.primitives.solids[solid]);
         }
-        let triangles: Vec<_> = list.iter().map(|i| self.primitives.triangles[*i as usize]).collect();
-        self.wide.packets.push(Packet::new(&triangles));
+        self.wide.packets.push(self.primitives.packet(list));
         Child::packet(self.wide.packets.len() - 1)
     }
 
@@ -235,7 +249,7 @@ mod tests {
     #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
     use super::super::wide::ChildKind;
     use super::*;
-    use glam::Vec3A;
+    use glam::{DVec3, Vec3A};
     use obvhs::bvh2::node::Bvh2Node;
 
     /// Nested boxes in a chain as deep as there are primitives: every inner node is a leaf and the rest.
@@ -267,14 +281,17 @@ mod tests {
 
     #[test]
     fn a_deep_chain_stays_within_the_stack() {
-        let triangles: Vec<(u32, [Vec3; 3])> = (0..3000u16)
-            .map(|i| (u32::from(i), [Vec3::ZERO, Vec3::X, Vec3::ONE].map(|v| v * 1.01f32.powi(-i32::from(i)))))
-            .collect();
-        let boxes: Vec<Aabb> = triangles.iter().map(|(_, t)| Aabb::new(Vec3A::ZERO, Vec3A::from(t[2]))).collect();
+        let size = |i: u16| 1.01f32.powi(-i32::from(i));
+        let vertices: Vec<Vec3> =
+            (0..3000).flat_map(|i| [Vec3::ZERO, Vec3::X, Vec3::ONE].map(|v| v * size(i))).collect();
+        let (triangles, indices): (Vec<u32>, Vec<_>) = (0..3000).map(|i| (i, [3 * i, 3 * i + 1, 3 * i + 2])).unzip();
+        let boxes: Vec<Aabb> = (0..3000).map(|i| Aabb::new(Vec3A::ZERO, Vec3A::splat(size(i)))).collect();
         let groups = Groups::of_equal(&boxes);
         let ordered: Vec<Aabb> = groups.firsts().map(|i| boxes[i as usize]).collect();
-        let primitives = Primitives { boxes: &boxes, groups: &groups, triangles: &triangles, solids: &[] };
-        let wide = collapse(&chain(&ordered), &primitives);
+        let frame = Frame { centre: DVec3::ZERO, scale: 1.0, inverse: 1.0 };
+        let primitives =
+            Primitives { frame, vertices: &vertices, indices: &indices, triangles: &triangles, solids: &[] };
+        let wide = collapse(&chain(&ordered), &groups, &primitives, |i| boxes[i]);
         let mut uses = vec![0; wide.packets.len()];
         assert_eq!(depth(&wide, 0, &mut uses), wide.depth);
         assert!(wide.depth > PLANNED_DEPTH && wide.depth <= MAX_DEPTH, "{}", wide.depth);

@@ -1,13 +1,30 @@
 //! Parameters of microfacet distributions.
 
-use crate::bsdf::{Distribution, Roughness};
+use crate::bsdf::{Distribution, RoughCoat, Roughness};
 use crate::load::document::Element;
 use crate::load::error::LoadError;
 use crate::load::plugin::Plugin;
 use crate::texture::Number;
+use std::cell::RefCell;
 
 /// Roughness α where it is not given.
 const ALPHA: f64 = 0.1;
+
+/// The coats that one load has tabulated: many surfaces of a scene share a coat.
+#[derive(Default)]
+pub(in crate::load) struct Coats(RefCell<Vec<RoughCoat>>);
+
+/// The coat of index `eta` whose one α is the same everywhere.
+pub(super) fn coat(plugin: &mut Plugin<'_>, eta: f64) -> Result<RoughCoat, LoadError> {
+    let facets = (distribution(plugin)?, plugin.positive("alpha")?.unwrap_or(ALPHA), visible(plugin)?);
+    let mut known = plugin.element.document.coats.0.borrow_mut();
+    if let Some(coat) = known.iter().find(|coat| coat.is_of(eta, facets)) {
+        return Ok(coat.clone());
+    }
+    let coat = RoughCoat::new(eta, facets);
+    known.push(coat.clone());
+    Ok(coat)
+}
 
 /// A distribution whose α may be two numbers and textures.
 pub(super) fn roughness(plugin: &mut Plugin<'_>) -> Result<Roughness, LoadError> {
@@ -23,11 +40,6 @@ pub(super) fn roughness(plugin: &mut Plugin<'_>) -> Result<Roughness, LoadError>
         (both.clone(), both)
     };
     Ok(Roughness { distribution, alpha_u, alpha_v, visible })
-}
-
-/// A distribution with one α, the same everywhere.
-pub(super) fn constant(plugin: &mut Plugin<'_>) -> Result<(Distribution, f64, bool), LoadError> {
-    Ok((distribution(plugin)?, plugin.positive("alpha")?.unwrap_or(ALPHA), visible(plugin)?))
 }
 
 fn distribution(plugin: &mut Plugin<'_>) -> Result<Distribution, LoadError> {
