@@ -359,7 +359,7 @@ fn whole_files_are_refused_with_a_reason() {
     let text = format!(
         "<scene version=\"3.0.0\"><default name=\"spp\" value=\"1\"/>{SENSOR}<default name=\"x\" value=\"$spp\"/></scene>"
     );
-    let found = message_of(&text, &Options { overrides, size: None });
+    let found = message_of(&text, &Options { overrides, ..Options::default() });
     assert_eq!(found, "scene.xml: nothing in this file uses the parameter `width`; expected spp");
     let found = message_of(&text, &Options { size: Some([0, 9]), ..plain });
     assert!(found.starts_with("scene.xml: an image of 0 × 9 pixels; expected 1 to 65536"), "{found}");

@@ -65,7 +65,7 @@ fn cameras_look_as_in_mitsuba() {
     for case in expected("cameras") {
         let overrides = case["overrides"].as_object().unwrap();
         let overrides = overrides.iter().map(|(name, value)| (name.clone(), value.as_str().unwrap().to_owned()));
-        let options = Options { overrides: overrides.collect(), size: None };
+        let options = Options { overrides: overrides.collect(), ..Options::default() };
         let thin = options.overrides.get("sensor").is_some_and(|sensor| sensor == "thinlens");
         let lens = "<float name=\"aperture_radius\" value=\"0.2\"/></sensor>";
         let text = if thin { text.replace("</sensor>", lens) } else { text.clone() };

@@ -33,7 +33,7 @@ fn sizes_and_parameters_can_be_overridden() {
         let plain = load(&Options::default());
         let sized = load(&Options { size: Some([20, 10]), ..Options::default() });
         let overrides = [("width", "20"), ("height", "10")].map(|(name, value)| (name.to_owned(), value.to_owned()));
-        let set = load(&Options { overrides: overrides.into(), size: None });
+        let set = load(&Options { overrides: overrides.into(), ..Options::default() });
         assert_eq!((sized.film, &sized.camera), (set.film, &set.camera), "{}", path.display());
         assert_eq!(sized.film.size, [20, 10]);
         assert_ne!(plain.hash, sized.hash);

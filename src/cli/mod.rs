@@ -71,6 +71,9 @@ struct SceneArguments {
     /// Value for a `<default>` of the scene file; may be repeated.
     #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = parse_define)]
     define: Vec<(String, String)>,
+    /// Replace or leave out what the file asks for and pathblend lacks, with a warning for each place.
+    #[arg(long)]
+    approximate: bool,
     /// Longest path in edges instead of the scene's (1: light seen directly, 2: direct light).
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     max_depth: Option<u32>,
@@ -79,7 +82,11 @@ struct SceneArguments {
 impl SceneArguments {
     /// Loads the scene; warnings go to standard error.
     fn load(&self) -> anyhow::Result<crate::scene::Scene> {
-        let options = crate::load::Options { size: self.size, overrides: self.define.iter().cloned().collect() };
+        let options = crate::load::Options {
+            size: self.size,
+            overrides: self.define.iter().cloned().collect(),
+            approximate: self.approximate,
+        };
         let loaded = crate::load::read(&self.scene, &options)?;
         for warning in &loaded.warnings {
             eprintln!("warning: {warning}");

@@ -181,7 +181,7 @@ pub(super) fn read(plugin: &mut Plugin<'_>, channels: &[usize]) -> Result<Textur
     }
     if raw.whole {
         let message = format!("`{}` is stored as whole numbers, which are taken as they are: 255 is not 1", raw.name);
-        plugin.element.document.warnings.borrow_mut().push(plugin.element.warning(message));
+        plugin.element.warn(message);
     }
     let triangles = (raw.per == Per::Vertex).then(|| skin.triangles.clone());
     Ok(Texture::Attribute(Attribute { triangles, values: values.clone(), scale }))

@@ -44,6 +44,9 @@ const KINDS: [&str; 18] = [
 /// Reflectance of shapes without a BSDF, and of `diffuse` without a parameter.
 const GREY: f64 = 0.5;
 
+/// What models call their colour, where a diffuse one stands for them.
+const COLOURS: [&str; 4] = ["reflectance", "diffuse_reflectance", "base_color", "specular_reflectance"];
+
 /// Deepest nesting of models; references may run in a circle.
 const DEEPEST: usize = 16;
 
@@ -104,11 +107,26 @@ impl Reader<'_> {
             "coating" | "roughcoating" => Bsdf::Coating(Box::new(self.coating(&mut plugin)?)),
             "twosided" => self.two_sided(&mut plugin)?,
             "bumpmap" | "normalmap" => self.relief(&mut plugin)?,
+            kind if !KINDS.contains(&kind) => self.substitute(&mut plugin)?,
             _ => plain(&mut plugin)?,
         };
         plugin.ignore(&FOREIGN);
         plugin.finish()?;
         self.depth -= 1;
+        Ok(bsdf)
+    }
+
+    /// What stands for an unknown model: the first one in it, or a diffuse one of its colour.
+    fn substitute(&mut self, plugin: &mut Plugin<'_>) -> Result<Bsdf, LoadError> {
+        let nested = plugin.objects("bsdf")?;
+        let by = if nested.is_empty() { "a diffuse one of its colour" } else { "the first model in it" };
+        plugin.stand_in(&KINDS, by)?;
+        let colour = COLOURS.into_iter().find(|name| plugin.is_given(name)).unwrap_or("reflectance");
+        let bsdf = match nested.first() {
+            Some(first) => self.read(*first)?,
+            None => Bsdf::Diffuse(Diffuse { reflectance: plugin.colour_texture(colour, GREY)? }),
+        };
+        plugin.ignore_rest();
         Ok(bsdf)
     }
 
@@ -234,6 +252,7 @@ fn plain(plugin: &mut Plugin<'_>) -> Result<Bsdf, LoadError> {
         }),
         "principled" => Bsdf::Principled(Box::new(principled::principled(plugin)?)),
         "null" => Bsdf::Null,
+        // Kinds that are not known have met `Reader::substitute`.
         _ => return Err(plugin.unknown(&KINDS)),
     })
 }

@@ -35,13 +35,15 @@ pub(super) struct Document<'a> {
     pub pictures: Pictures,
     /// Rough coats of its scattering models.
     pub coats: Coats,
+    /// Whether what is not known is replaced or left out.
+    pub approximate: bool,
     /// What was read over in files of Mitsuba 0.5 and 0.6, and what is hardly meant.
     pub warnings: RefCell<Vec<String>>,
 }
 
 impl<'a> Document<'a> {
-    /// The scene in `files`, of which `trees` has the trees in the same order.
-    pub fn new(files: &'a Files, trees: &'a [Tree<'a>]) -> Result<Self, LoadError> {
+    /// The scene in `files`, of which `trees` has the trees in the same order; `approximate` as in [`super::Options`].
+    pub fn new(files: &'a Files, trees: &'a [Tree<'a>], approximate: bool) -> Result<Self, LoadError> {
         let mut document = Self {
             files,
             trees,
@@ -51,6 +53,7 @@ impl<'a> Document<'a> {
             shows_attributes: false,
             pictures: Pictures::default(),
             coats: Coats::default(),
+            approximate,
             warnings: RefCell::default(),
         };
         document.versions()?;
@@ -251,9 +254,10 @@ impl<'a> Element<'a> {
         self.source().error(self.node.range().start, message)
     }
 
-    /// A warning about this element: its place and the message on one line.
-    pub fn warning(self, message: impl Into<String>) -> String {
-        self.error(message).to_string().lines().next().unwrap_or_default().to_owned()
+    /// Warns of this element: its place and the message on one line.
+    pub fn warn(self, message: impl Into<String>) {
+        let line = self.error(message).to_string().lines().next().unwrap_or_default().to_owned();
+        self.document.warnings.borrow_mut().push(line);
     }
 }
 
@@ -266,6 +270,6 @@ pub(super) fn with_root<R>(
 ) -> Result<R, LoadError> {
     let files = Files::read(Source::new(path, text.to_owned()), &std::collections::BTreeMap::new())?;
     let trees = files.trees()?;
-    let document = Document::new(&files, &trees)?;
+    let document = Document::new(&files, &trees, false)?;
     Ok(test(document.root()))
 }

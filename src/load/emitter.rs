@@ -33,7 +33,11 @@ pub(super) fn read(element: Element<'_>) -> Result<Vec<Shine>, LoadError> {
         "area" => {
             return Err(element.error("an area emitter shines from a shape; expected it inside of a <shape>"));
         }
-        _ => return Err(plugin.unknown(&KINDS)),
+        _ => {
+            plugin.stand_in(&KINDS, "left out")?;
+            plugin.ignore_rest();
+            Vec::new()
+        }
     };
     plugin.finish()?;
     Ok(shines)

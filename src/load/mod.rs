@@ -81,6 +81,8 @@ pub struct Options {
     pub overrides: BTreeMap<String, String>,
     /// Width and height of the image in pixels instead of the file's.
     pub size: Option<[usize; 2]>,
+    /// Replace what is not known by the nearest thing, or leave it out, with a warning, instead of refusing it.
+    pub approximate: bool,
 }
 
 /// A scene, and what the user should know about it.
@@ -102,7 +104,7 @@ pub fn read(path: &Path, options: &Options) -> Result<Loaded, LoadError> {
     }
     let files = Files::read(main, &options.overrides)?;
     let trees = files.trees()?;
-    let document = Document::new(&files, &trees)?;
+    let document = Document::new(&files, &trees, options.approximate)?;
     let mut reader = Reader { size: options.size, ..Reader::default() };
     for source in &files.sources {
         reader.builder.fingerprint(source.text.as_bytes());
@@ -176,7 +178,11 @@ impl Reader {
             // Other programs keep their settings in files of Mitsuba 0.5 and 0.6.
             other if element.is_legacy() && !UNSUPPORTED.contains(&other) => {
                 let message = format!("<{other}> is not an element of a scene and is read over");
-                self.warnings.push(element.warning(message));
+                element.warn(message);
+                Ok(())
+            }
+            other if element.document.approximate => {
+                element.warn(format!("<{other}> is not known: left out"));
                 Ok(())
             }
             other => {

@@ -95,6 +95,15 @@ impl<'a> Plugin<'a> {
         self.element.error(message)
     }
 
+    /// Says what stands for a plugin of an unknown kind: `by`; an error where the user has not asked for that.
+    pub fn stand_in(&self, known: &[&str], by: &str) -> Result<(), LoadError> {
+        if !self.element.document.approximate {
+            return Err(self.unknown(known));
+        }
+        self.element.warn(format!("the {} `{}` is not known: {by}", self.element.tag(), self.kind));
+        Ok(())
+    }
+
     /// An error that the parameter `name` is missing.
     pub fn lacks(&self, name: &str) -> LoadError {
         self.element.error(format!("{} `{}` lacks the parameter `{name}`", self.element.tag(), self.kind))
@@ -282,11 +291,17 @@ impl<'a> Plugin<'a> {
             const SCALARS: [&str; 4] = ["boolean", "integer", "float", "string"];
             let (odd, rest) = self.children.into_iter().partition(|child| SCALARS.contains(&child.element.tag()));
             let odd: Vec<Child<'_>> = odd;
-            let warn = |child: Child<'_>| {
-                child.element.warning(format!("{} `{}` has no such parameter", self.element.tag(), self.kind))
-            };
-            self.element.document.warnings.borrow_mut().extend(odd.into_iter().map(warn));
+            for child in odd {
+                child.element.warn(format!("{} `{}` has no such parameter", self.element.tag(), self.kind));
+            }
             self.children = rest;
+        }
+        if self.element.document.approximate {
+            for Child { element: child, .. } in self.children {
+                let name = child.attribute("name").map_or(child.tag(), |name| name.text);
+                child.warn(format!("{} `{}` has no parameter `{name}` here: left out", self.element.tag(), self.kind));
+            }
+            return Ok(());
         }
         let Some(Child { element: child, .. }) = self.children.first() else {
             return Ok(());

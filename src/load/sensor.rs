@@ -24,7 +24,7 @@ const SKEW_TOLERANCE: f64 = 1e-3;
 pub(super) fn read(element: Element<'_>, size: Option<[usize; 2]>) -> Result<(Camera, FilmSpec), LoadError> {
     let mut plugin = Plugin::new(element)?;
     if !KINDS.contains(&plugin.kind) {
-        return Err(plugin.unknown(&KINDS));
+        plugin.stand_in(&KINDS, "a perspective one")?;
     }
     plugin.objects("sampler")?;
     let Film { whole, crop, filter } = plugin.object("film")?.map_or(Ok(Film::default()), film)?;
@@ -183,7 +183,7 @@ fn film(element: Element<'_>) -> Result<Film, LoadError> {
     let kinds = ["hdrfilm", "ldrfilm", "mfilm"];
     let known = &kinds[..if element.is_legacy() { 3 } else { 1 }];
     if !known.contains(&plugin.kind) {
-        return Err(plugin.unknown(known));
+        plugin.stand_in(known, "an hdrfilm")?;
     }
     // How the image is written is decided on the command line.
     plugin.ignore(&["file_format", "pixel_format", "component_format", "banner", "filename", "sample_border"]);
@@ -231,7 +231,11 @@ fn filter(element: Element<'_>) -> Result<Filter, LoadError> {
             let stddev = stddev.map(|s| s.check(in_range, "a number above 0 and at most 16")).transpose()?;
             Filter::Gaussian { stddev: stddev.unwrap_or(0.5) }
         }
-        _ => return Err(plugin.unknown(&["box", "tent", "gaussian"])),
+        _ => {
+            plugin.stand_in(&["box", "tent", "gaussian"], "a gaussian one")?;
+            plugin.ignore_rest();
+            Film::default().filter
+        }
     };
     plugin.finish()?;
     Ok(filter)

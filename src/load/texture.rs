@@ -4,6 +4,7 @@ use super::attributes::{self, Skin};
 use super::document::Element;
 use super::error::LoadError;
 use super::plugin::Plugin;
+use crate::spectrum::Spectrum;
 use crate::texture::{Bitmap, Checkerboard, Colour, Lookup, Number, Texture, Wrap};
 use glam::{DAffine2, DAffine3, DMat2, DVec2};
 use std::sync::Arc;
@@ -88,8 +89,13 @@ pub(super) fn read(element: Element<'_>, skin: Option<&Skin>, role: Role) -> Res
             colours: [plugin.share("color0", 0.4)?, plugin.share("color1", 0.2)?],
             to_uv: to_uv(&mut plugin)?,
         }),
-        _ if role == Role::Height => return Err(plugin.unknown(&KINDS[..2])),
-        _ => return Err(plugin.unknown(&KINDS)),
+        _ => {
+            let known = if role == Role::Height { &KINDS[..2] } else { &KINDS[..] };
+            plugin.stand_in(known, "a grey of 0.5")?;
+            plugin.ignore_rest();
+            let colours = [Spectrum::grey(0.5); 2];
+            Texture::Checkerboard(Checkerboard { colours, to_uv: DAffine2::IDENTITY })
+        }
     };
     plugin.ignore(&HARMLESS);
     plugin.finish()?;
