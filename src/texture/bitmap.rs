@@ -29,16 +29,19 @@ pub enum Wrap {
 }
 
 impl Wrap {
-    /// The pixel out of `size` that is seen in the place of pixel `index`.
+    /// The pixel out of `count` that is seen in the place of pixel `index`, which is far outside where it saturates. No
+    /// division where it is one of them, as it nearly always is.
     #[inline]
-    fn apply(self, index: i64, size: usize) -> usize {
-        let count = size as i64;
+    fn apply(self, index: i32, count: i32) -> usize {
+        if (0..count).contains(&index) {
+            return index as usize;
+        }
         let inside = match self {
             Self::Repeat => index.rem_euclid(count),
             Self::Clamp => index.clamp(0, count - 1),
             Self::Mirror => {
-                let place = index.rem_euclid(2 * count);
-                if place < count { place } else { 2 * count - 1 - place }
+                let place = i64::from(index).rem_euclid(2 * i64::from(count));
+                place.min(2 * i64::from(count) - 1 - place) as i32
             }
         };
         inside as usize
@@ -63,18 +66,18 @@ pub struct Bitmap {
 impl Bitmap {
     #[inline]
     pub(super) fn colour(&self, uv: DVec2) -> Spectrum {
-        let [width, height] = self.picture.size();
-        let place = self.to_uv.transform_point2(uv) * DVec2::new(width as f64, height as f64);
-        let pixel = |x, y| self.picture.pixel(self.wrap.apply(x, width), self.wrap.apply(y, height), self.raw);
+        let [width, height] = self.picture.size().map(|pixels| pixels as i32);
+        let place = self.to_uv.transform_point2(uv) * DVec2::new(f64::from(width), f64::from(height));
+        let column = |x| self.wrap.apply(x, width);
+        let row = |y| self.wrap.apply(y, height);
         if self.lookup == Lookup::Nearest {
-            return pixel(place.x.floor() as i64, place.y.floor() as i64);
+            return self.picture.pixel(column(place.x.floor() as i32), row(place.y.floor() as i32), self.raw);
         }
         let low = (place - 0.5).floor();
-        let share = place - 0.5 - low;
-        let [x, y] = [low.x as i64, low.y as i64];
-        let [right, below] = [x.saturating_add(1), y.saturating_add(1)];
-        let row = |y| pixel(x, y) * (1.0 - share.x) + pixel(right, y) * share.x;
-        row(y) * (1.0 - share.y) + row(below) * share.y
+        let (x, y) = (low.x as i32, low.y as i32);
+        let columns = [column(x), column(x.saturating_add(1))];
+        let rows = [row(y), row(y.saturating_add(1))];
+        self.picture.between(columns, rows, place - 0.5 - low, self.raw)
     }
 
     pub(super) fn mean(&self) -> Spectrum {

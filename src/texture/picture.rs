@@ -1,6 +1,7 @@
 //! Pixels as they are stored: compactly, decoded by table when they are looked up.
 
 use crate::spectrum::Spectrum;
+use glam::DVec2;
 use half::f16;
 use std::fmt;
 use std::sync::{LazyLock, OnceLock};
@@ -37,6 +38,9 @@ impl Texels {
     }
 }
 
+/// Most pixels along a side.
+const MOST: usize = 1 << 30;
+
 /// An image of one channel, which is grey, or of three.
 #[derive(Clone, PartialEq)]
 pub struct Picture {
@@ -54,9 +58,11 @@ impl fmt::Debug for Picture {
 }
 
 impl Picture {
-    /// A picture of width × height pixels; `None` where there are none, or not one or three samples for each.
+    /// A picture of width × height pixels; `None` where there are none, too many, or not one or three
+    /// samples for each.
     pub fn new(size: [usize; 2], texels: Texels) -> Option<Self> {
         let pixels = size[0].checked_mul(size[1]).filter(|pixels| *pixels > 0)?;
+        size.iter().all(|side| *side <= MOST).then_some(())?;
         let channels = texels.len() / pixels;
         let whole = [1, 3].contains(&channels) && texels.len() == channels * pixels;
         whole.then(|| Self { size, channels, texels, means: Default::default() })
@@ -71,23 +77,48 @@ impl Picture {
     /// The colour of the pixel in column `x` and row `y`; samples in the sRGB curve are decoded unless `raw`.
     #[inline]
     pub fn pixel(&self, x: usize, y: usize, raw: bool) -> Spectrum {
-        let first = (y * self.size[0] + x) * self.channels;
-        if self.channels == 1 {
-            return Spectrum::grey(self.sample(first, raw));
+        self.weighted([(x, y, 1.0)], raw)
+    }
+
+    /// The colour between two columns and two rows, at `share` of the way from the first to the second.
+    #[inline]
+    pub fn between(&self, [left, right]: [usize; 2], [top, bottom]: [usize; 2], share: DVec2, raw: bool) -> Spectrum {
+        let DVec2 { x, y } = share;
+        let (above, below) = (1.0 - y, y);
+        let places = [
+            (left, top, (1.0 - x) * above),
+            (right, top, x * above),
+            (left, bottom, (1.0 - x) * below),
+            (right, bottom, x * below),
+        ];
+        self.weighted(places, raw)
+    }
+
+    /// The sum of pixels, each given by column, row and weight.
+    #[inline]
+    fn weighted<const N: usize>(&self, pixels: [(usize, usize, f64); N], raw: bool) -> Spectrum {
+        // One decision for all samples, not one for each.
+        match &self.texels {
+            Texels::Bytes(samples) if raw => self.sum(pixels, |i| f64::from(samples[i]) * (1.0 / 255.0)),
+            Texels::Bytes(samples) => {
+                let decoded: &[f64; 256] = &BYTES;
+                self.sum(pixels, |i| decoded[usize::from(samples[i])])
+            }
+            Texels::Shorts(samples) if raw => self.sum(pixels, |i| f64::from(samples[i]) * (1.0 / 65535.0)),
+            Texels::Shorts(samples) => {
+                let decoded: &[f64] = &SHORTS;
+                self.sum(pixels, |i| decoded[usize::from(samples[i])])
+            }
+            Texels::Halves(samples) => self.sum(pixels, |i| samples[i].to_f64()),
+            Texels::Floats(samples) => self.sum(pixels, |i| f64::from(samples[i])),
         }
-        Spectrum::rgb(self.sample(first, raw), self.sample(first + 1, raw), self.sample(first + 2, raw))
     }
 
     #[inline]
-    fn sample(&self, index: usize, raw: bool) -> f64 {
-        match &self.texels {
-            Texels::Bytes(samples) if raw => f64::from(samples[index]) / 255.0,
-            Texels::Bytes(samples) => BYTES[usize::from(samples[index])],
-            Texels::Shorts(samples) if raw => f64::from(samples[index]) / 65535.0,
-            Texels::Shorts(samples) => SHORTS[usize::from(samples[index])],
-            Texels::Halves(samples) => samples[index].to_f64(),
-            Texels::Floats(samples) => f64::from(samples[index]),
-        }
+    fn sum<const N: usize>(&self, pixels: [(usize, usize, f64); N], sample: impl Fn(usize) -> f64) -> Spectrum {
+        let firsts = pixels.map(|(x, y, weight)| ((y * self.size[0] + x) * self.channels, weight));
+        let channel = |c: usize| firsts.iter().map(|(first, weight)| sample(first + c) * weight).sum();
+        if self.channels == 1 { Spectrum::grey(channel(0)) } else { Spectrum::rgb(channel(0), channel(1), channel(2)) }
     }
 
     /// The mean of all pixels.
@@ -101,7 +132,7 @@ impl Picture {
 }
 
 /// Linear value of each byte in the sRGB curve.
-static BYTES: LazyLock<Vec<f64>> = LazyLock::new(|| (0..=255).map(|code| decode(f64::from(code) / 255.0)).collect());
+static BYTES: LazyLock<[f64; 256]> = LazyLock::new(|| std::array::from_fn(|code| decode(code as f64 / 255.0)));
 
 static SHORTS: LazyLock<Vec<f64>> =
     LazyLock::new(|| (0..=65535).map(|code| decode(f64::from(code) / 65535.0)).collect());
