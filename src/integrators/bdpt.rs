@@ -5,11 +5,11 @@ use super::path::film_position;
 use super::{Counts, render::Settings};
 use crate::film::{Band, Film, Kernel, Splats};
 use crate::math::Stream;
-use crate::paths::{Heuristic, Random, Subpath, connect, light_vertex, trace_camera, trace_light};
+use crate::paths::{Connection, Random, Subpath, Techniques, Vertex, connect, light_vertex, trace_camera, trace_light};
 use crate::scene::{Caster, Scene};
 
 /// Vertices of a subpath before Russian roulette sets in.
-const ROULETTE_FROM: usize = 5;
+pub(super) const ROULETTE_FROM: usize = 5;
 
 /// The method's settings.
 pub(super) struct Bdpt {
@@ -65,25 +65,44 @@ impl Job<'_> {
         trace_camera(&self.scene, film, first, rows, max_depth + 1, ROULETTE_FROM, &mut self.camera);
         // s = 0 takes all edges from the camera; t = 1 leaves one edge to the connection.
         trace_light(&self.scene, rows, max_depth, ROULETTE_FROM, &mut self.light);
-        let (camera, light) = (&self.camera.vertices, &self.light.vertices);
-        for t in 1..=camera.len() {
-            for s in 0..=light.len().min(max_depth + 1 - t) {
-                if s + t < 2 {
-                    continue;
-                }
-                let fresh;
-                let start = if s == 1 {
-                    let Some(vertex) = light_vertex(&self.scene, self.stream.row()) else { continue };
-                    fresh = [vertex];
-                    &fresh[..]
-                } else {
-                    &light[..s]
-                };
-                let Some(found) = connect(&self.scene, start, &camera[..t], Heuristic::Power) else { continue };
-                match found.film {
-                    Some(film) => self.splats.add(self.kernel, film, found.class, found.value),
-                    None => band.add(pixel, found.class, found.value),
-                }
+        let Self { scene, kernel, stream, camera, light, splats, .. } = self;
+        let (camera, light) = (&camera.vertices, &light.vertices);
+        connect_all(scene, light, camera, 1, max_depth, &Techniques::CONNECTIONS, stream, |found| match found.film {
+            Some(film) => splats.add(kernel, film, found.class, found.value),
+            None => band.add(pixel, found.class, found.value),
+        });
+    }
+}
+
+/// Connects all parts of `light` with all parts of `camera` that have at least `least` vertices, up to paths of
+/// `max_depth` edges.
+#[inline]
+#[allow(clippy::too_many_arguments)]
+pub(super) fn connect_all(
+    scene: &Caster<'_>,
+    light: &[Vertex],
+    camera: &[Vertex],
+    least: usize,
+    max_depth: usize,
+    techniques: &Techniques,
+    stream: &mut Stream,
+    mut add: impl FnMut(Connection),
+) {
+    for t in least..=camera.len() {
+        for s in 0..=light.len().min(max_depth + 1 - t) {
+            if s + t < 2 {
+                continue;
+            }
+            let fresh;
+            let start = if s == 1 {
+                let Some(vertex) = light_vertex(scene, stream.row()) else { continue };
+                fresh = [vertex];
+                &fresh[..]
+            } else {
+                &light[..s]
+            };
+            if let Some(found) = connect(scene, start, &camera[..t], techniques) {
+                add(found);
             }
         }
     }

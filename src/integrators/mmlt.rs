@@ -11,7 +11,7 @@ use super::{Acceptance, Counts, path::Path, render::Settings};
 use crate::film::{Film, Health, Kernel, PathClass, Splats};
 use crate::markov::{ChainState, LARGE_STEP_PROBABILITY};
 use crate::math::{Discrete, Stream};
-use crate::paths::{Heuristic, Subpath, connect, trace_camera, trace_light};
+use crate::paths::{Subpath, Techniques, connect, trace_camera, trace_light};
 use crate::scene::{Caster, Scene};
 use crate::spectrum::Spectrum;
 use glam::DVec2;
@@ -265,7 +265,7 @@ impl Lane {
         if self.light.vertices.len() != s {
             return None;
         }
-        let found = connect(scene, &self.light.vertices, &self.camera.vertices, Heuristic::Power)?;
+        let found = connect(scene, &self.light.vertices, &self.camera.vertices, &Techniques::CONNECTIONS)?;
         let value = found.value * techniques as f64;
         let luminance = value.luminance();
         (self.health.accepts(value) && luminance > 0.0).then_some(Contribution {

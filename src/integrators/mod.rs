@@ -4,10 +4,12 @@
 //! A new method: its file with `start` and `pass`, and one arm in each match below.
 
 mod bdpt;
+mod grid;
 mod mmlt;
 mod path;
 mod render;
 mod sppm;
+mod vcm;
 
 pub use render::{Budget, Outcome, Progress, Settings, render};
 
@@ -26,6 +28,8 @@ pub enum Method {
     Bdpt,
     /// Stochastic progressive photon mapping.
     Sppm,
+    /// Vertex connection and merging.
+    Vcm,
     /// Multiplexed Metropolis light transport.
     Mmlt,
 }
@@ -37,6 +41,7 @@ impl Method {
             Self::Path => "path",
             Self::Bdpt => "bdpt",
             Self::Sppm => "sppm",
+            Self::Vcm => "vcm",
             Self::Mmlt => "mmlt",
         }
     }
@@ -76,6 +81,7 @@ enum Integrator {
     Path(path::Path),
     Bdpt(bdpt::Bdpt),
     Sppm(sppm::Sppm),
+    Vcm(vcm::Vcm),
     Mmlt(Box<mmlt::Mmlt>),
 }
 
@@ -85,6 +91,7 @@ impl Integrator {
             Method::Path => Self::Path(path::Path::start(settings)),
             Method::Bdpt => Self::Bdpt(bdpt::Bdpt::start(settings)),
             Method::Sppm => Self::Sppm(sppm::Sppm::start(scene, settings)),
+            Method::Vcm => Self::Vcm(vcm::Vcm::start(scene, settings)),
             Method::Mmlt => Self::Mmlt(Box::new(mmlt::Mmlt::start(scene, settings))),
         }
     }
@@ -95,6 +102,7 @@ impl Integrator {
             Self::Path(path) => path.pass(scene, film, pass, counts),
             Self::Bdpt(bdpt) => bdpt.pass(scene, film, pass, counts),
             Self::Sppm(sppm) => sppm.pass(scene, film, pass, counts),
+            Self::Vcm(vcm) => vcm.pass(scene, film, pass, counts),
             Self::Mmlt(mmlt) => mmlt.pass(scene, film, pass, counts),
         }
     }

@@ -1,6 +1,6 @@
 //! Connections of a light subpath with a camera subpath.
 
-use super::mis::{self, Heuristic, Junction};
+use super::mis::{self, Joint, Junction, Techniques};
 use super::subpath::{Vertex, VertexKind};
 use super::trace::{light_offset, reverse_pdf, shading_correction};
 use crate::bsdf::Evaluation;
@@ -26,18 +26,18 @@ pub struct Connection {
 /// Connects all of `light` (s vertices) with all of `camera` (t ≥ 1 vertices): value, weight and class of the path.
 /// `None` where nothing is contributed.
 #[inline]
-pub fn connect(scene: &Caster<'_>, light: &[Vertex], camera: &[Vertex], heuristic: Heuristic) -> Option<Connection> {
+pub fn connect(scene: &Caster<'_>, light: &[Vertex], camera: &[Vertex], techniques: &Techniques) -> Option<Connection> {
     let end = camera.last()?;
     match (light.last(), &end.kind) {
-        (None, _) => see_light(scene, camera, heuristic),
+        (None, _) => see_light(scene, camera, techniques),
         (Some(_), VertexKind::Environment(_)) => None,
-        (Some(start), VertexKind::Camera) => reach_camera(scene, light, start, camera, heuristic),
-        (Some(start), _) => join(scene, light, start, camera, end, heuristic),
+        (Some(start), VertexKind::Camera) => reach_camera(scene, light, start, camera, techniques),
+        (Some(start), _) => join(scene, light, start, camera, end, techniques),
     }
 }
 
 /// s = 0: the walk from the camera met a light.
-fn see_light(scene: &Caster<'_>, camera: &[Vertex], heuristic: Heuristic) -> Option<Connection> {
+fn see_light(scene: &Caster<'_>, camera: &[Vertex], techniques: &Techniques) -> Option<Connection> {
     let [.., previous, end] = camera else { return None };
     let (id, start) = match &end.kind {
         VertexKind::Environment(id) => (*id, Start::Infinite { towards: -end.back }),
@@ -59,7 +59,8 @@ fn see_light(scene: &Caster<'_>, camera: &[Vertex], heuristic: Heuristic) -> Opt
         camera_previous: emitted_pdf(emitter, &start, previous, end.back, previous.position - end.position).0,
         ..Junction::default()
     };
-    let weight = if camera.len() == 2 { 1.0 } else { mis::weight(&[], camera, &junction, heuristic) };
+    let weight =
+        if camera.len() == 2 { 1.0 } else { mis::weight(&[], camera, &junction, Joint::Connected, techniques) };
     Some(Connection { value: end.throughput * radiance * weight, class: end.word.class(), film: None })
 }
 
@@ -147,7 +148,7 @@ fn join(
     start: &Vertex,
     camera: &[Vertex],
     end: &Vertex,
-    heuristic: Heuristic,
+    techniques: &Techniques,
 ) -> Option<Connection> {
     if !start.connects || !end.connects {
         return None;
@@ -180,7 +181,7 @@ fn join(
         camera: arrival(scene, &light_end.onward, end, -to_light, distance_squared),
         camera_previous: camera_end.previous,
     };
-    let weight = mis::weight(light, camera, &junction, heuristic);
+    let weight = mis::weight(light, camera, &junction, Joint::Connected, techniques);
     Some(Connection { value: value * weight, class: light_end.word.join(camera_end.word), film: None })
 }
 
@@ -190,7 +191,7 @@ fn reach_camera(
     light: &[Vertex],
     start: &Vertex,
     camera: &[Vertex],
-    heuristic: Heuristic,
+    techniques: &Techniques,
 ) -> Option<Connection> {
     // Lights seen directly are left to the walk from the camera, which finds every one of them.
     if light.len() == 1 {
@@ -215,6 +216,6 @@ fn reach_camera(
         light_previous: light_end.previous,
         ..Junction::default()
     };
-    let weight = mis::weight(light, camera, &junction, heuristic);
+    let weight = mis::weight(light, camera, &junction, Joint::Connected, techniques);
     Some(Connection { value: value * weight, class: light_end.word.class(), film: Some(film) })
 }

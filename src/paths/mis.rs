@@ -4,6 +4,10 @@
 //! C_{s-1} / L_{s-1}, where L_i and C_i are the densities of vertex x_i in a walk from the light and from the camera.
 //! A vertex with delta lobes only cannot be an end of a connection, so techniques that would connect there have no
 //! density; the coefficients of its Dirac densities stand in for the densities and cancel.
+//!
+//! Merging (Georgiev et al. 2012, *Light Transport Simulation with Vertex Connection and Merging*) joins a light subpath
+//! that ends near x_i with a camera subpath that ends at x_i. Both have sampled x_i, and any of N light subpaths may end
+//! within the radius r, so its density is that of the connection with i + 1 light vertices times η C_i, η = N π r².
 
 use super::subpath::{Vertex, VertexKind};
 use crate::emitter::Start;
@@ -33,7 +37,7 @@ pub enum Heuristic {
 
 impl Heuristic {
     #[inline]
-    fn apply(self, ratio: f64) -> f64 {
+    pub(super) fn apply(self, ratio: f64) -> f64 {
         match self {
             Self::Balance => ratio,
             Self::Power => ratio * ratio,
@@ -41,10 +45,44 @@ impl Heuristic {
     }
 }
 
-/// Weight of the technique that connects `light` (all its vertices) with `camera` (all its vertices).
+/// The techniques that a method combines, and how.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Techniques {
+    /// How their densities make weights.
+    pub heuristic: Heuristic,
+    /// Light subpaths that may be merged with a camera subpath, times the area that they are merged over; 0 for methods
+    /// that only connect.
+    pub merging: f64,
+}
+
+impl Techniques {
+    /// Connections only.
+    pub const CONNECTIONS: Self = Self { heuristic: Heuristic::Power, merging: 0.0 };
+}
+
+/// How the two subpaths come together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Joint {
+    /// By a connection of their ends.
+    Connected,
+    /// By a merger at the last light vertex; the camera subpath is the one that ends before it.
+    Merged,
+}
+
+/// Weight of the technique that connects `light` (all its vertices) with `camera` (all its vertices), whose density is
+/// the unit of those of the others; for a merger what its weight is, divided by its density in that unit.
 #[inline]
-pub(super) fn weight(light: &[Vertex], camera: &[Vertex], junction: &Junction, heuristic: Heuristic) -> f64 {
-    let mut sum = 1.0;
+pub(super) fn weight(
+    light: &[Vertex],
+    camera: &[Vertex],
+    junction: &Junction,
+    joint: Joint,
+    techniques: &Techniques,
+) -> f64 {
+    let Techniques { heuristic, merging } = *techniques;
+    let merged = joint == Joint::Merged;
+    // After a merger the last camera vertex has scattered, perhaps in a way that no connection can.
+    let mut sum = if merged && camera[camera.len() - 1].delta { 0.0 } else { 1.0 };
 
     // Techniques with more vertices from the camera: x_{s-1}, x_{s-2}, … change sides.
     let mut ratio = 1.0;
@@ -54,9 +92,12 @@ pub(super) fn weight(light: &[Vertex], camera: &[Vertex], junction: &Junction, h
             2 => junction.light_previous,
             _ => light[i].reverse.0,
         };
-        ratio *= from_camera / light[i].forward.0;
         // The end of the subpath is connected, however the walk went on from there.
         let scatters_delta = light[i].delta && i < light.len() - 1;
+        if merging > 0.0 && i > 0 && light[i].connects && !scatters_delta {
+            sum += heuristic.apply(ratio * merging * from_camera);
+        }
+        ratio *= from_camera / light[i].forward.0;
         let possible = if i == 0 { can_be_hit(&light[0]) } else { !scatters_delta && !light[i - 1].delta };
         if possible {
             sum += heuristic.apply(ratio);
@@ -71,9 +112,13 @@ pub(super) fn weight(light: &[Vertex], camera: &[Vertex], junction: &Junction, h
             2 => junction.camera_previous,
             _ => camera[i].reverse.0,
         };
-        ratio *= from_light / camera[i].forward.0;
         // The end is connected, or it is the light that the walk met: however the walk went on does not matter.
-        let scatters_delta = camera[i].delta && i < camera.len() - 1;
+        let scatters_delta = camera[i].delta && (merged || i < camera.len() - 1);
+        let on_light = light.is_empty() && i == camera.len() - 1;
+        if merging > 0.0 && !on_light && camera[i].connects && !scatters_delta {
+            sum += heuristic.apply(ratio * merging * from_light);
+        }
+        ratio *= from_light / camera[i].forward.0;
         if !scatters_delta && !camera[i - 1].delta {
             sum += heuristic.apply(ratio);
         }

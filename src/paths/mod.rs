@@ -6,6 +6,7 @@
 
 mod connect;
 mod direct;
+mod merge;
 mod mis;
 mod rows;
 mod subpath;
@@ -13,7 +14,8 @@ mod trace;
 
 pub use connect::{Connection, connect};
 pub use direct::{Direct, direct_pdf, sample_direct};
-pub use mis::Heuristic;
+pub use merge::merge;
+pub use mis::{Heuristic, Techniques};
 pub use rows::{Random, Rows};
 pub use subpath::{Subpath, Vertex, VertexKind};
 pub use trace::{light_vertex, shading_correction, trace_camera, trace_light};
