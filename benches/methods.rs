@@ -14,7 +14,7 @@ fn methods(criterion: &mut Criterion) {
     let scene = load::read(&file, &options).expect("the box loads").scene;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     let settings = Settings { seed: 1, max_depth: 10, features: true, budget: Budget::Passes(4) };
-    for method in [Method::Path, Method::Bdpt, Method::Sppm, Method::Mmlt] {
+    for method in [Method::Path, Method::Bdpt, Method::Sppm, Method::Vcm, Method::Mmlt] {
         let run = || pool.install(|| render(&scene, method, &settings, |_| {}));
         let counts = run().counts;
         let mut group = criterion.benchmark_group("box 128x128, depth 10, one thread");

@@ -13,7 +13,7 @@ use pathblend::math::Frame;
 use pathblend::scene::{Builder, FilmSpec, Mesh, Scene, Shine};
 use pathblend::spectrum::Spectrum;
 
-const METHODS: [Method; 4] = [Method::Path, Method::Bdpt, Method::Sppm, Method::Mmlt];
+const METHODS: [Method; 5] = [Method::Path, Method::Bdpt, Method::Sppm, Method::Vcm, Method::Mmlt];
 const SIZE: usize = 16;
 /// Threshold in standard errors. With 15 degrees of freedom a correct program exceeds it about once in 3·10⁵ tests.
 const SIGMAS: f64 = 7.0;
@@ -189,7 +189,7 @@ fn a_point_light_in_a_glass_ball_shines_as_if_it_were_bare() {
         reflectance / std::f64::consts::PI * intensity * height / distance_squared.powf(1.5)
     };
     let expected = (0..n * n).map(radiance).sum::<f64>() / (n * n) as f64;
-    for method in [Method::Bdpt, Method::Sppm, Method::Mmlt] {
+    for method in [Method::Bdpt, Method::Sppm, Method::Vcm, Method::Mmlt] {
         expect(&scene, method, 250, "beauty", expected, colour_mean);
         // The first interface lets 96 % pass, and each way back again 96 % of the rest.
         let class = |image: &Image| layer_mean(image, "path_LSDE");

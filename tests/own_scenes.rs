@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 const SCENES: [&str; 11] =
     ["box", "spheres", "plates", "door", "torus", "ring", "lamp", "gallery", "pool", "bokeh", "porch"];
-const METHODS: [Method; 4] = [Method::Path, Method::Bdpt, Method::Sppm, Method::Mmlt];
+const METHODS: [Method; 5] = [Method::Path, Method::Bdpt, Method::Sppm, Method::Vcm, Method::Mmlt];
 /// Side of the references, and of the tiles that they are compared in.
 const SIDE: usize = 64;
 const TILE: usize = 16;

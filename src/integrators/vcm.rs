@@ -248,7 +248,7 @@ fn usual_footprint(scene: &Scene, settings: &Settings) -> f64 {
                 }
                 distance += pair[1].position.distance(pair[0].position);
                 if pair[1].connects {
-                    footprints.push(distance * scene.camera.pixel_width());
+                    footprints.push(scene.camera.pixel_width(distance));
                     break;
                 }
             }
