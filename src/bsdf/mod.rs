@@ -151,6 +151,14 @@ impl Bsdf {
     /// Value, densities and letter for a pair of directions; `None` where the value is zero, always so for delta lobes.
     #[inline]
     pub fn evaluate(&self, uv: DVec2, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
+        // The most frequent model needs no call; nested models make one of the rest.
+        match self {
+            Self::Diffuse(diffuse) => diffuse.evaluate(uv, wi, wo),
+            _ => self.evaluate_any(uv, wi, wo, walk),
+        }
+    }
+
+    fn evaluate_any(&self, uv: DVec2, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
         match self {
             Self::Diffuse(diffuse) => diffuse.evaluate(uv, wi, wo),
             Self::RoughConductor(rough) => rough.evaluate(uv, wi, wo),
@@ -172,6 +180,13 @@ impl Bsdf {
     /// Samples a direction from the first three numbers of `row`; `None` where light is absorbed.
     #[inline]
     pub fn sample(&self, uv: DVec2, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
+        match self {
+            Self::Diffuse(diffuse) => diffuse.sample(uv, wi, row),
+            _ => self.sample_any(uv, wi, row, walk),
+        }
+    }
+
+    fn sample_any(&self, uv: DVec2, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
         let turned = |bsdf: &Self| {
             let scatter = bsdf.sample(uv, flip(wi), row, walk)?;
             Some(Scatter { direction: flip(scatter.direction), ..scatter })

@@ -8,6 +8,11 @@ impl Bsdf {
     /// Whether all lobes for light from `wi` are Dirac densities, so that no connection can be made there.
     #[inline]
     pub fn is_delta(&self, wi: DVec3) -> bool {
+        // As in `Bsdf::evaluate`, the most frequent model needs no call.
+        !matches!(self, Self::Diffuse(_)) && self.is_all_delta(wi)
+    }
+
+    fn is_all_delta(&self, wi: DVec3) -> bool {
         match self {
             Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) | Self::Null => true,
             Self::Diffuse(_)

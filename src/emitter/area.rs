@@ -69,29 +69,20 @@ impl Surface {
         }
     }
 
-    /// A point with its normal and, on triangles, its texture coordinates, uniformly by area.
+    /// A point with its normal, uniformly by area; where it is `textured`, on triangles also its texture coordinates.
     #[inline]
-    fn sample(&self, row: Row) -> (DVec3, DVec3, DVec2) {
+    fn sample(&self, row: Row, textured: bool) -> (DVec3, DVec3, DVec2) {
         match self {
             Self::Triangles { facets, choice } => {
                 let (index, u) = choice.sample(row[1]);
                 let facet = &facets[index];
                 let at = warp::triangle::sample([u, row[2]]);
-                (facet.corner + facet.edges[0] * at.x + facet.edges[1] * at.y, facet.normal, facet.uv(at))
+                let uv = if textured { facet.uv(at) } else { DVec2::ZERO };
+                (facet.corner + facet.edges[0] * at.x + facet.edges[1] * at.y, facet.normal, uv)
             }
-            Self::Solid(Solid::Sphere { center, radius, .. }) => {
-                let normal = warp::sphere::sample([row[1], row[2]]);
-                (*center + normal * *radius, normal, DVec2::ZERO)
-            }
-            Self::Solid(Solid::Disk { center, normal, radius, .. }) => {
-                let at = warp::disk::sample([row[1], row[2]]) * *radius;
-                let frame = Frame::around(*normal);
-                (*center + frame.tangent * at.x + frame.bitangent * at.y, *normal, DVec2::ZERO)
-            }
-            Self::Solid(Solid::Cylinder { bottom, axes, length, radius }) => {
-                let (sin, cos) = (2.0 * PI * row[1]).sin_cos();
-                let normal = axes.tangent * cos + axes.bitangent * sin;
-                (*bottom + axes.normal * (row[2] * *length) + normal * *radius, normal, DVec2::ZERO)
+            Self::Solid(solid) => {
+                let (position, normal) = sample_solid(solid, row);
+                (position, normal, DVec2::ZERO)
             }
         }
     }
@@ -102,9 +93,29 @@ impl Surface {
             (_, Colour::Constant(radiance)) => self.area() * radiance.luminance(),
             (Self::Triangles { facets, .. }, _) => facets.iter().map(|facet| facet.area * facet.mean(radiance)).sum(),
             (Self::Solid(solid), _) => {
-                let uv = |[u, v]: [f64; 2]| solid.chart(self.sample([0.0, u, v, 0.0]).0).uv;
+                let uv = |[u, v]: [f64; 2]| solid.chart(self.sample([0.0, u, v, 0.0], false).0).uv;
                 self.area() * mean(PROBES[1], |u| radiance.at(uv(u)).luminance().max(0.0))
             }
+        }
+    }
+}
+
+/// A point of a solid with its normal, uniformly by area.
+fn sample_solid(solid: &Solid, row: Row) -> (DVec3, DVec3) {
+    match solid {
+        Solid::Sphere { center, radius, .. } => {
+            let normal = warp::sphere::sample([row[1], row[2]]);
+            (*center + normal * *radius, normal)
+        }
+        Solid::Disk { center, normal, radius, .. } => {
+            let at = warp::disk::sample([row[1], row[2]]) * *radius;
+            let frame = Frame::around(*normal);
+            (*center + frame.tangent * at.x + frame.bitangent * at.y, *normal)
+        }
+        Solid::Cylinder { bottom, axes, length, radius } => {
+            let (sin, cos) = (2.0 * PI * row[1]).sin_cos();
+            let normal = axes.tangent * cos + axes.bitangent * sin;
+            (*bottom + axes.normal * (row[2] * *length) + normal * *radius, normal)
         }
     }
 }
@@ -137,8 +148,9 @@ impl Area {
 
     #[inline]
     pub(super) fn start(&self, row: Row) -> (Start, AreaPdf) {
-        let (position, normal, mut uv) = self.surface.sample(row);
-        if let (Surface::Solid(solid), Colour::Textured(_)) = (&self.surface, &self.radiance) {
+        let textured = !self.radiance.is_constant();
+        let (position, normal, mut uv) = self.surface.sample(row, textured);
+        if let (Surface::Solid(solid), true) = (&self.surface, textured) {
             uv = solid.chart(position).uv;
         }
         (Start::Surface { position, normal, uv }, self.start_pdf())

@@ -15,6 +15,7 @@ pub const OFFSET: f64 = 1.0 / (1u64 << 43) as f64;
 /// The distance along [`geometric_normal`] by which to move a point, computed from its barycentrics in `f64`, to the
 /// side that the ray leaves to. Less than it, a wall in front can be told from the surface itself.
 #[must_use]
+#[inline]
 pub fn of_triangle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
     OFFSET * a.abs().max(b.abs()).max(c.abs()).max_element()
 }
