@@ -43,7 +43,8 @@ impl Facing {
 }
 
 impl Relief {
-    /// The share of the light from `towards` that is left (Estevez et al. 2019, eqs. 2 and 3, and section 16.3 for α).
+    /// The share of the light from `towards` that is left: Smith's masking for GGX, whose α² is an eighth of the squared
+    /// tangent of the tilt (Estevez et al. 2019).
     fn shadowing(&self, up: DVec3, towards: DVec3) -> f64 {
         if !self.shadows {
             return 1.0;
