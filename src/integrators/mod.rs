@@ -7,6 +7,7 @@ mod bdpt;
 mod grid;
 mod mmlt;
 mod path;
+mod photons;
 mod render;
 mod sppm;
 mod vcm;

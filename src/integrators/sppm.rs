@@ -9,6 +9,7 @@
 
 use super::grid::{Grids, Located};
 use super::path::{self, State, film_position};
+use super::photons::{FIRST_RADIUS, JOBS, is_beside, job_range, shrinkage};
 use super::{Counts, render::Settings};
 use crate::film::{Band, Film, Kernel, Word};
 use crate::math::{Stream, Walk};
@@ -18,19 +19,6 @@ use crate::spectrum::Spectrum;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::f64::consts::PI;
-
-/// Share of the photons in a radius that is kept from pass to pass (Knaus and Zwicker 2011, eq. 20); the field's usual
-/// value.
-const ALPHA: f64 = 2.0 / 3.0;
-
-/// First radius in units of the size that a pixel has at the distance of the gathering vertex.
-const FIRST_RADIUS: f64 = 2.5;
-
-/// Photons whose distance from the tangent plane exceeds this share of the radius lie on another surface.
-const FLATNESS: f64 = 0.3;
-
-/// Jobs that the photons of a pass are split into, independent of the number of threads.
-const JOBS: usize = 32;
 
 /// Vertices of a photon's path before Russian roulette sets in.
 const ROULETTE_FROM: usize = 3;
@@ -109,8 +97,7 @@ impl Sppm {
             }
         });
         counts.add((self.photons + size[0] * size[1]) as u64, rays);
-        let n = (pass + 1) as f64;
-        self.shrinkage *= (n + ALPHA) / (n + 1.0);
+        self.shrinkage *= shrinkage(pass);
     }
 
     /// Walks from the camera to the first diffuse-like vertex, adding light met on the way and direct light. What such a
@@ -175,8 +162,7 @@ impl Sppm {
         let mut stream = Stream::new(self.seed, &[1, pass, job]);
         let mut path = Subpath::default();
         let mut photons = Vec::new();
-        let (first, last) = (self.photons * job as usize / JOBS, self.photons * (job as usize + 1) / JOBS);
-        for _ in first..last {
+        for _ in job_range(self.photons, job as usize) {
             trace_light(&caster, &mut Random(&mut stream), self.max_depth, ROULETTE_FROM, &mut path);
             // The first surface receives direct light, which the walks from the camera account for.
             for (edges, vertex) in path.vertices.iter().enumerate().skip(2) {
@@ -201,8 +187,8 @@ impl Sppm {
         let wi = surface.frame.to_local(gather.back);
         let scale = gather.throughput / (PI * radius * radius);
         grids.within(surface.position, *radius, |photon| {
-            let height = (photon.position - surface.position).dot(surface.geometric).abs();
-            if height > FLATNESS * radius || photon.edges + gather.edges > self.max_depth {
+            let beside = is_beside(photon.position - surface.position, surface.geometric, *radius);
+            if !beside || photon.edges + gather.edges > self.max_depth {
                 return;
             }
             let wo = surface.frame.to_local(photon.back);

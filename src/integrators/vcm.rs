@@ -10,6 +10,7 @@
 use super::bdpt::{ROULETTE_FROM, connect_all};
 use super::grid::{Grid, Located};
 use super::path::film_position;
+use super::photons::{FIRST_RADIUS, JOBS, is_beside, job_range, shrinkage};
 use super::{Counts, render::Settings};
 use crate::film::{Film, Kernel, Splats};
 use crate::math::{Row, Stream};
@@ -18,22 +19,9 @@ use crate::scene::{Caster, Scene};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
-use std::ops::Range;
-
-/// Share of the photons in a radius that is kept from pass to pass; the field's usual value.
-const ALPHA: f64 = 2.0 / 3.0;
-
-/// First radius in units of the size that a pixel usually has where the camera's walks can first be merged.
-const FIRST_RADIUS: f64 = 2.5;
-
-/// Vertices whose distance from the tangent plane exceeds this share of the radius lie on another surface.
-const FLATNESS: f64 = 0.3;
 
 /// Most light subpaths of a pass: their vertices take some 300 bytes each.
 const MOST_PATHS: usize = 1 << 17;
-
-/// Jobs that the light subpaths of a pass are split into, independent of the number of threads.
-const JOBS: usize = 32;
 
 /// Pixels along an axis that are probed for the first radius.
 const PROBES: usize = 64;
@@ -130,8 +118,7 @@ impl Vcm {
         counts.add((self.paths + pixels) as u64, rays);
         let splats: Vec<Splats> = bundles.into_iter().map(|bundle| bundle.splats).collect();
         film.splat(&splats);
-        let n = (pass + 1) as f64;
-        self.radius *= ((n + ALPHA) / (n + 1.0)).sqrt();
+        self.radius *= shrinkage(pass).sqrt();
     }
 
     /// The light subpaths of one job, connected with the lens.
@@ -182,10 +169,10 @@ impl Vcm {
             let end = &camera[t - 1];
             let Some(surface) = end.surface().filter(|_| end.connects) else { continue };
             grid.within(end.position, self.radius, |photon| {
-                let height = (photon.position - end.position).dot(surface.geometric).abs();
+                let beside = is_beside(photon.position - end.position, surface.geometric, self.radius);
                 let light = &bundles[photon.job as usize].vertices[photon.start as usize..photon.end as usize];
                 // Both subpaths hold the vertex: a path of s + t − 1 vertices has s + t − 2 edges.
-                if height > FLATNESS * self.radius || light.len() + t - 2 > self.max_depth {
+                if !beside || light.len() + t - 2 > self.max_depth {
                     return;
                 }
                 if let Some(found) = merge(scene, light, &camera[..t], techniques) {
@@ -194,11 +181,6 @@ impl Vcm {
             });
         }
     }
-}
-
-/// The light subpaths of a job.
-fn job_range(paths: usize, job: usize) -> Range<usize> {
-    paths * job / JOBS..paths * (job + 1) / JOBS
 }
 
 /// Light subpath number `number` of all.
