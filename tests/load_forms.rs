@@ -116,7 +116,7 @@ fn spectra_can_be_files() {
     let spd = "# nm value\n400 0.1\n500 0.2 # more\n\n600 0.7\n700 0.9\n";
     let scene = load_files(&[("main.xml", &text), ("s.spd", spd)]).scene;
     let Bsdf::Diffuse(paint) = &scene.bsdfs()[0] else { panic!("{:?}", scene.bsdfs()) };
-    close(paint.reflectance.at(DVec2::ZERO).to_rgb(), [0.856_079, 0.404_085, 0.112_402]);
+    close(paint.reflectance.at(&Spot::default()).to_rgb(), [0.856_079, 0.404_085, 0.112_402]);
 }
 
 /// Directions to the top left and to the bottom right corner.

@@ -4,8 +4,8 @@ use super::lobes::mirrored;
 use super::{Scatter, fresnel};
 use crate::math::Row;
 use crate::spectrum::Spectrum;
-use crate::texture::Colour;
-use glam::{DVec2, DVec3};
+use crate::texture::{Colour, Spot};
+use glam::DVec3;
 
 /// A smooth metal.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,8 +19,8 @@ pub struct Conductor {
 impl Conductor {
     /// Reflected share at the positive cosine `cos_i`.
     #[inline]
-    pub(super) fn reflectance(&self, uv: DVec2, cos_i: f64) -> Spectrum {
-        let factor = self.specular_reflectance.at(uv);
+    pub(super) fn reflectance(&self, spot: &Spot, cos_i: f64) -> Spectrum {
+        let factor = self.specular_reflectance.at(spot);
         match self.index {
             Some((eta, k)) => fresnel::conductor(cos_i, eta, k) * factor,
             None => factor,
@@ -28,8 +28,8 @@ impl Conductor {
     }
 
     #[inline]
-    pub(super) fn sample(&self, uv: DVec2, wi: DVec3) -> Option<Scatter> {
-        (wi.z > 0.0).then(|| Scatter::delta(mirrored(wi), self.reflectance(uv, wi.z), 1.0, 1.0))
+    pub(super) fn sample(&self, spot: &Spot, wi: DVec3) -> Option<Scatter> {
+        (wi.z > 0.0).then(|| Scatter::delta(mirrored(wi), self.reflectance(spot, wi.z), 1.0, 1.0))
     }
 
     pub(super) fn invert(&self, wi: DVec3, wo: DVec3, gamma: Row) -> Option<Row> {

@@ -1,6 +1,5 @@
 //! Scattering at surfaces. Directions are unit vectors in the shading frame (normal = +z) and point away from the
-//! surface: `wi` back to the previous vertex of the walk, `wo` on to the next. `uv` are the texture coordinates of the
-//! point.
+//! surface: `wi` back to the previous vertex of the walk, `wo` on to the next. `spot` is where textures are looked up.
 //!
 //! A model may have delta lobes beside others. [`Bsdf::evaluate`] knows of the others only; [`Bsdf::sample`] chooses
 //! among all, and says of what kind its choice was.
@@ -48,7 +47,8 @@ pub use thin_dielectric::ThinDielectric;
 
 use crate::math::{Row, SolidAnglePdf, Walk};
 use crate::spectrum::Spectrum;
-use glam::{DVec2, DVec3};
+use crate::texture::Spot;
+use glam::DVec3;
 
 /// The letter that a vertex has in Heckbert's notation, for one pair of directions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -150,63 +150,63 @@ fn pass(wi: DVec3) -> Scatter {
 impl Bsdf {
     /// Value, densities and letter for a pair of directions; `None` where the value is zero, always so for delta lobes.
     #[inline]
-    pub fn evaluate(&self, uv: DVec2, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
+    pub fn evaluate(&self, spot: &Spot, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
         // The most frequent model needs no call; nested models make one of the rest.
         match self {
-            Self::Diffuse(diffuse) => diffuse.evaluate(uv, wi, wo),
-            _ => self.evaluate_any(uv, wi, wo, walk),
+            Self::Diffuse(diffuse) => diffuse.evaluate(spot, wi, wo),
+            _ => self.evaluate_any(spot, wi, wo, walk),
         }
     }
 
-    fn evaluate_any(&self, uv: DVec2, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
+    fn evaluate_any(&self, spot: &Spot, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
         match self {
-            Self::Diffuse(diffuse) => diffuse.evaluate(uv, wi, wo),
-            Self::RoughConductor(rough) => rough.evaluate(uv, wi, wo),
-            Self::RoughDielectric(rough) => rough.evaluate(uv, wi, wo, walk),
+            Self::Diffuse(diffuse) => diffuse.evaluate(spot, wi, wo),
+            Self::RoughConductor(rough) => rough.evaluate(spot, wi, wo),
+            Self::RoughDielectric(rough) => rough.evaluate(spot, wi, wo, walk),
             Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) | Self::Null => None,
-            Self::Plastic(plastic) => plastic.evaluate(uv, wi, wo),
-            Self::RoughPlastic(plastic) => plastic.evaluate(uv, wi, wo),
-            Self::Phong(phong) => phong.evaluate(uv, wi, wo),
-            Self::Principled(principled) => principled.evaluate(uv, wi, wo, walk),
-            Self::Coating(coating) => coating.evaluate(uv, wi, wo, walk),
-            Self::Mask(mask) => mask.evaluate(uv, wi, wo, walk),
-            Self::Blend(blend) => blend.evaluate(uv, wi, wo, walk),
-            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].evaluate(uv, wi, wo, walk),
-            Self::TwoSided(sides) => sides[1].evaluate(uv, flip(wi), flip(wo), walk),
-            Self::Turned(bsdf) => bsdf.evaluate(uv, flip(wi), flip(wo), walk),
+            Self::Plastic(plastic) => plastic.evaluate(spot, wi, wo),
+            Self::RoughPlastic(plastic) => plastic.evaluate(spot, wi, wo),
+            Self::Phong(phong) => phong.evaluate(spot, wi, wo),
+            Self::Principled(principled) => principled.evaluate(spot, wi, wo, walk),
+            Self::Coating(coating) => coating.evaluate(spot, wi, wo, walk),
+            Self::Mask(mask) => mask.evaluate(spot, wi, wo, walk),
+            Self::Blend(blend) => blend.evaluate(spot, wi, wo, walk),
+            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].evaluate(spot, wi, wo, walk),
+            Self::TwoSided(sides) => sides[1].evaluate(spot, flip(wi), flip(wo), walk),
+            Self::Turned(bsdf) => bsdf.evaluate(spot, flip(wi), flip(wo), walk),
         }
     }
 
     /// Samples a direction from the first three numbers of `row`; `None` where light is absorbed.
     #[inline]
-    pub fn sample(&self, uv: DVec2, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
+    pub fn sample(&self, spot: &Spot, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
         match self {
-            Self::Diffuse(diffuse) => diffuse.sample(uv, wi, row),
-            _ => self.sample_any(uv, wi, row, walk),
+            Self::Diffuse(diffuse) => diffuse.sample(spot, wi, row),
+            _ => self.sample_any(spot, wi, row, walk),
         }
     }
 
-    fn sample_any(&self, uv: DVec2, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
+    fn sample_any(&self, spot: &Spot, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
         let turned = |bsdf: &Self| {
-            let scatter = bsdf.sample(uv, flip(wi), row, walk)?;
+            let scatter = bsdf.sample(spot, flip(wi), row, walk)?;
             Some(Scatter { direction: flip(scatter.direction), ..scatter })
         };
         match self {
-            Self::Diffuse(diffuse) => diffuse.sample(uv, wi, row),
-            Self::RoughConductor(rough) => rough.sample(uv, wi, row),
-            Self::RoughDielectric(rough) => rough.sample(uv, wi, row, walk),
-            Self::Conductor(conductor) => conductor.sample(uv, wi),
+            Self::Diffuse(diffuse) => diffuse.sample(spot, wi, row),
+            Self::RoughConductor(rough) => rough.sample(spot, wi, row),
+            Self::RoughDielectric(rough) => rough.sample(spot, wi, row, walk),
+            Self::Conductor(conductor) => conductor.sample(spot, wi),
             Self::Dielectric(dielectric) => dielectric.sample(wi, row, walk),
             Self::ThinDielectric(pane) => pane.sample(wi, row),
             Self::Null => Some(pass(wi)),
-            Self::Plastic(plastic) => plastic.sample(uv, wi, row),
-            Self::RoughPlastic(plastic) => plastic.sample(uv, wi, row),
-            Self::Phong(phong) => phong.sample(uv, wi, row),
-            Self::Principled(principled) => principled.sample(uv, wi, row, walk),
-            Self::Coating(coating) => coating.sample(uv, wi, row, walk),
-            Self::Mask(mask) => mask.sample(uv, wi, row, walk),
-            Self::Blend(blend) => blend.sample(uv, wi, row, walk),
-            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].sample(uv, wi, row, walk),
+            Self::Plastic(plastic) => plastic.sample(spot, wi, row),
+            Self::RoughPlastic(plastic) => plastic.sample(spot, wi, row),
+            Self::Phong(phong) => phong.sample(spot, wi, row),
+            Self::Principled(principled) => principled.sample(spot, wi, row, walk),
+            Self::Coating(coating) => coating.sample(spot, wi, row, walk),
+            Self::Mask(mask) => mask.sample(spot, wi, row, walk),
+            Self::Blend(blend) => blend.sample(spot, wi, row, walk),
+            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].sample(spot, wi, row, walk),
             Self::TwoSided(sides) => turned(&sides[1]),
             Self::Turned(bsdf) => turned(bsdf),
         }
@@ -215,28 +215,28 @@ impl Bsdf {
     /// A row that [`Bsdf::sample`] takes from `wi` to `wo`; numbers that the sampling leaves open are taken from
     /// `gamma`, and so is the lobe where several lead to `wo`. `delta` says whether a delta lobe is to be chosen, which
     /// the directions alone do not. `None` where `wo` cannot be sampled so.
-    pub fn invert(&self, uv: DVec2, wi: DVec3, wo: DVec3, delta: bool, gamma: Row) -> Option<Row> {
+    pub fn invert(&self, spot: &Spot, wi: DVec3, wo: DVec3, delta: bool, gamma: Row) -> Option<Row> {
         if if delta { !self.has_delta(wi) } else { self.is_delta(wi) } {
             return None;
         }
         match self {
             Self::Diffuse(diffuse) => diffuse.invert(wi, wo, gamma),
-            Self::RoughConductor(rough) => rough.invert(uv, wi, wo, gamma),
-            Self::RoughDielectric(rough) => rough.invert(uv, wi, wo, gamma),
+            Self::RoughConductor(rough) => rough.invert(spot, wi, wo, gamma),
+            Self::RoughDielectric(rough) => rough.invert(spot, wi, wo, gamma),
             Self::Conductor(conductor) => conductor.invert(wi, wo, gamma),
             Self::Dielectric(dielectric) => dielectric.invert(wi, wo, gamma),
             Self::ThinDielectric(pane) => pane.invert(wi, wo, gamma),
             Self::Null => (wi.z * wo.z < 0.0).then_some(gamma),
-            Self::Plastic(plastic) => plastic.invert(uv, wi, wo, delta, gamma),
-            Self::RoughPlastic(plastic) => plastic.invert(uv, wi, wo, gamma),
-            Self::Phong(phong) => phong.invert(uv, wi, wo, gamma),
-            Self::Principled(principled) => principled.invert(uv, wi, wo, gamma),
-            Self::Coating(coating) => coating.invert(uv, wi, wo, delta, gamma),
-            Self::Mask(mask) => mask.invert(uv, wi, wo, delta, gamma),
-            Self::Blend(blend) => blend.invert(uv, wi, wo, delta, gamma),
-            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].invert(uv, wi, wo, delta, gamma),
-            Self::TwoSided(sides) => sides[1].invert(uv, flip(wi), flip(wo), delta, gamma),
-            Self::Turned(bsdf) => bsdf.invert(uv, flip(wi), flip(wo), delta, gamma),
+            Self::Plastic(plastic) => plastic.invert(spot, wi, wo, delta, gamma),
+            Self::RoughPlastic(plastic) => plastic.invert(spot, wi, wo, gamma),
+            Self::Phong(phong) => phong.invert(spot, wi, wo, gamma),
+            Self::Principled(principled) => principled.invert(spot, wi, wo, gamma),
+            Self::Coating(coating) => coating.invert(spot, wi, wo, delta, gamma),
+            Self::Mask(mask) => mask.invert(spot, wi, wo, delta, gamma),
+            Self::Blend(blend) => blend.invert(spot, wi, wo, delta, gamma),
+            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].invert(spot, wi, wo, delta, gamma),
+            Self::TwoSided(sides) => sides[1].invert(spot, flip(wi), flip(wo), delta, gamma),
+            Self::Turned(bsdf) => bsdf.invert(spot, flip(wi), flip(wo), delta, gamma),
         }
     }
 }

@@ -9,7 +9,10 @@ use super::*;
 use crate::math::{Stream, warp};
 use models::{Case, cases};
 
-const UV: DVec2 = DVec2::new(0.3, 0.7);
+/// The models of these tests are the same everywhere.
+fn here() -> Spot {
+    Spot::default()
+}
 
 /// Directions over the whole sphere, but for those along the surface.
 fn incident(stream: &mut Stream) -> DVec3 {
@@ -38,7 +41,7 @@ fn for_samples(seed: u64, n: usize, mut law: impl FnMut(&Case, DVec3, Row, &Scat
         for i in 0..n {
             let (wi, row) = (incident(&mut stream), stream.row());
             let walk = if i % 2 == 0 { Walk::FromLight } else { Walk::FromCamera };
-            if let Some(scatter) = case.bsdf.sample(UV, wi, row, walk) {
+            if let Some(scatter) = case.bsdf.sample(&here(), wi, row, walk) {
                 law(&case, wi, row, &scatter, walk, &mut stream);
             }
         }
@@ -56,7 +59,7 @@ fn sampling_agrees_with_evaluation() {
             assert_eq!(scatter.letter, Letter::S);
             return;
         }
-        let evaluation = case.bsdf.evaluate(UV, wi, scatter.direction, walk).expect("what is sampled evaluates");
+        let evaluation = case.bsdf.evaluate(&here(), wi, scatter.direction, walk).expect("what is sampled evaluates");
         let weight = evaluation.value * (scatter.direction.z.abs() / evaluation.pdf.0);
         assert_close(name, "weight", weight, scatter.weight);
         assert_close(name, "density", Spectrum::grey(evaluation.pdf.0), Spectrum::grey(scatter.pdf.0));
@@ -75,13 +78,13 @@ fn walks_are_adjoint() {
         if scatter.delta || wo.z == 0.0 {
             return;
         }
-        let there = case.bsdf.evaluate(UV, wi, wo, walk).expect("what is sampled evaluates");
-        let back = case.bsdf.evaluate(UV, wo, wi, other(walk)).expect("the way back exists");
+        let there = case.bsdf.evaluate(&here(), wi, wo, walk).expect("what is sampled evaluates");
+        let back = case.bsdf.evaluate(&here(), wo, wi, other(walk)).expect("the way back exists");
         assert_close(name, "adjoint", there.value, back.value);
         assert_close(name, "reverse", Spectrum::grey(there.pdf_reverse.0), Spectrum::grey(back.pdf.0));
         assert_close(name, "forward", Spectrum::grey(there.pdf.0), Spectrum::grey(back.pdf_reverse.0));
         for walk in [Walk::FromCamera, Walk::FromLight] {
-            let letter = |a, b| case.bsdf.evaluate(UV, a, b, walk).map(|evaluation| evaluation.letter);
+            let letter = |a, b| case.bsdf.evaluate(&here(), a, b, walk).map(|evaluation| evaluation.letter);
             assert_eq!((letter(wi, wo), letter(wo, wi)), (Some(there.letter), Some(there.letter)), "{name}");
         }
     });
@@ -97,8 +100,8 @@ fn delta_lobes_are_adjoint() {
         }
         let near = |a: f64, b: f64| (a - b).abs() <= 1e-8 * a.abs().max(b.abs()) + 1e-13;
         let mut agrees = |_: usize| {
-            let row = case.bsdf.invert(UV, wo, wi, true, stream.row()).expect("the way back inverts");
-            let back = case.bsdf.sample(UV, wo, row, other(walk)).expect("the way back exists");
+            let row = case.bsdf.invert(&here(), wo, wi, true, stream.row()).expect("the way back inverts");
+            let back = case.bsdf.sample(&here(), wo, row, other(walk)).expect("the way back exists");
             assert!(back.delta && (back.direction - wi).length() < 1e-7, "{name}");
             let there = (scatter.weight * (scatter.pdf.0 / wo.z.abs())).to_rgb();
             let again = (back.weight * (scatter.pdf_reverse.0 / wi.z.abs())).to_rgb();
@@ -114,13 +117,13 @@ fn delta_lobes_are_adjoint() {
 fn rows_invert() {
     for_samples(5, 3000, |case, wi, row, scatter, walk, stream| {
         let (name, wo) = (&case.name, scatter.direction);
-        let back = case.bsdf.invert(UV, wi, wo, scatter.delta, stream.row()).expect("a sampled direction inverts");
+        let back = case.bsdf.invert(&here(), wi, wo, scatter.delta, stream.row()).expect("a sampled direction inverts");
         assert!(back.iter().all(|number| (0.0..=1.0).contains(number)), "{name}: {back:?}");
         if !scatter.delta && !case.mixes {
             let near = |i: usize| (back[i] - row[i]).abs() < 1e-6;
             assert!(near(1) && near(2), "{name}: {row:?} {back:?}");
         }
-        let again = case.bsdf.sample(UV, wi, back, walk).expect("the inverse samples");
+        let again = case.bsdf.sample(&here(), wi, back, walk).expect("the inverse samples");
         assert_eq!(again.delta, scatter.delta, "{name}");
         assert!((again.direction - wo).length() < 1e-6, "{name}: {wi} {row:?} {back:?} {} {wo}", again.direction);
     });
@@ -136,9 +139,9 @@ fn inverted_rows_keep_their_distribution() {
         for wi in [DVec3::new(0.3, 0.1, 0.9).normalize(), DVec3::new(0.5, -0.7, -0.4).normalize()] {
             for _ in 0..4000 {
                 let row = stream.row();
-                let Some(scatter) = case.bsdf.sample(UV, wi, row, Walk::FromLight) else { continue };
+                let Some(scatter) = case.bsdf.sample(&here(), wi, row, Walk::FromLight) else { continue };
                 let gamma = stream.row();
-                let back = case.bsdf.invert(UV, wi, scatter.direction, scatter.delta, gamma).expect("it inverts");
+                let back = case.bsdf.invert(&here(), wi, scatter.direction, scatter.delta, gamma).expect("it inverts");
                 for (i, bins) in counts.iter_mut().enumerate() {
                     for (row, bins) in [row, back].iter().zip(bins) {
                         bins[((row[i] * BINS as f64) as usize).min(BINS - 1)] += 1.0;
@@ -162,7 +165,7 @@ fn energy_is_conserved() {
         for wi in [DVec3::new(0.3, 0.1, 0.9), DVec3::new(0.5, -0.7, -0.4), DVec3::new(0.9, 0.3, 0.15)] {
             let (n, mut sum, mut squares) = (20_000, 0.0, 0.0);
             for _ in 0..n {
-                let scatter = case.bsdf.sample(UV, wi.normalize(), stream.row(), Walk::FromLight);
+                let scatter = case.bsdf.sample(&here(), wi.normalize(), stream.row(), Walk::FromLight);
                 let weight = scatter.map_or(0.0, |scatter| scatter.weight.luminance());
                 sum += weight;
                 squares += weight * weight;
@@ -182,7 +185,7 @@ fn refraction_squeezes_radiance_only() {
         specular_reflectance: Spectrum::ONE,
         specular_transmittance: Spectrum::ONE,
     });
-    let weight = |walk| glass.sample(UV, DVec3::Z, [0.5; 4], walk).expect("passes").weight.to_rgb()[0];
+    let weight = |walk| glass.sample(&here(), DVec3::Z, [0.5; 4], walk).expect("passes").weight.to_rgb()[0];
     assert!((weight(Walk::FromCamera) - 1.0 / 2.25).abs() < 1e-12);
     assert!((weight(Walk::FromLight) - 1.0).abs() < 1e-12);
 }

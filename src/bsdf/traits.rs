@@ -1,7 +1,7 @@
 //! What integrators ask of a model before they look at directions.
 
 use super::{Bsdf, Letter, flip};
-use crate::texture::Number;
+use crate::texture::{Number, Texture};
 use glam::DVec3;
 
 impl Bsdf {
@@ -111,6 +111,26 @@ impl Bsdf {
             | Self::Plastic(_)
             | Self::RoughPlastic(_)
             | Self::Phong(_) => true,
+        }
+    }
+
+    /// The texture that it is most likely to ask for, if any.
+    #[inline]
+    pub fn texture(&self) -> Option<&Texture> {
+        match self {
+            Self::Diffuse(diffuse) => diffuse.reflectance.texture(),
+            Self::Plastic(plastic) => plastic.base.reflectance.texture(),
+            Self::RoughPlastic(plastic) => plastic.base.reflectance.texture(),
+            Self::Phong(phong) => phong.diffuse_reflectance.texture(),
+            Self::Principled(principled) => principled.base_color.texture(),
+            Self::Conductor(metal) => metal.specular_reflectance.texture(),
+            Self::RoughConductor(rough) => rough.metal.specular_reflectance.texture(),
+            Self::Dielectric(_) | Self::ThinDielectric(_) | Self::RoughDielectric(_) | Self::Null => None,
+            Self::Coating(coating) => coating.nested.texture(),
+            Self::Mask(mask) => mask.nested.texture(),
+            Self::Blend(blend) => blend.nested[0].texture().or_else(|| blend.nested[1].texture()),
+            Self::TwoSided(sides) => sides[0].texture().or_else(|| sides[1].texture()),
+            Self::Turned(bsdf) => bsdf.texture(),
         }
     }
 

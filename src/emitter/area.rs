@@ -94,7 +94,7 @@ impl Surface {
             (Self::Triangles { facets, .. }, _) => facets.iter().map(|facet| facet.area * facet.mean(radiance)).sum(),
             (Self::Solid(solid), _) => {
                 let uv = |[u, v]: [f64; 2]| solid.chart(self.sample([0.0, u, v, 0.0], false).0).uv;
-                self.area() * mean(PROBES[1], |u| radiance.at(uv(u)).luminance().max(0.0))
+                self.area() * mean(PROBES[1], |u| radiance.at(&uv(u).into()).luminance().max(0.0))
             }
         }
     }
@@ -135,7 +135,7 @@ impl Facet {
     }
 
     fn mean(&self, radiance: &Colour) -> f64 {
-        mean(PROBES[0], |u| radiance.at(self.uv(warp::triangle::sample(u))).luminance().max(0.0))
+        mean(PROBES[0], |u| radiance.at(&self.uv(warp::triangle::sample(u)).into()).luminance().max(0.0))
     }
 }
 

@@ -150,7 +150,7 @@ pub(super) fn background(scene: &Caster<'_>, state: &State, pixel: [usize; 2], b
 #[inline]
 pub(super) fn emission(scene: &Caster<'_>, surface: &Surface, state: &State, pixel: [usize; 2], band: &mut Band) {
     let Some(id) = surface.emitter else { return };
-    let start = Start::Surface { position: surface.position, normal: surface.geometric, uv: surface.uv };
+    let start = Start::Surface { position: surface.position, normal: surface.geometric, uv: surface.spot.uv };
     let radiance = scene.emitter(id).radiance(&start, -state.direction);
     if radiance.is_black() {
         return;

@@ -171,6 +171,7 @@ mod tests {
 
     use super::super::document::with_root;
     use super::*;
+    use crate::texture::Spot;
     use crate::image::{Image, WriteOptions};
     use ::image::{Rgb, RgbImage};
     use std::path::Path;
@@ -219,7 +220,7 @@ mod tests {
     }
 
     fn assert_shows(colour: &Colour, expected: [f32; 3], tolerance: f64) {
-        let found = colour.at(DVec2::new(0.3, 0.8)).to_rgb();
+        let found = colour.at(&DVec2::new(0.3, 0.8).into()).to_rgb();
         let close = found.iter().zip(expected).all(|(a, b)| (a - f64::from(b)).abs() < tolerance);
         assert!(close, "{colour:?}: {found:?}, expected {expected:?}");
     }
@@ -241,9 +242,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let read = |parameter: &str| colour(folder.path(), parameter);
         let board = read("<ref name=\"reflectance\" id=\"board\"/>").unwrap();
-        assert_eq!(board.at(DVec2::splat(0.1)).to_rgb(), [0.4; 3]);
-        assert_eq!(read("<rgb name=\"reflectance\" value=\"0.1\"/>").unwrap().at(DVec2::ZERO).to_rgb(), [0.1; 3]);
-        assert_eq!(read("").unwrap().at(DVec2::ZERO).to_rgb(), [0.5; 3]);
+        assert_eq!(board.at(&DVec2::splat(0.1).into()).to_rgb(), [0.4; 3]);
+        assert_eq!(read("<rgb name=\"reflectance\" value=\"0.1\"/>").unwrap().at(&Spot::default()).to_rgb(), [0.1; 3]);
+        assert_eq!(read("").unwrap().at(&Spot::default()).to_rgb(), [0.5; 3]);
         assert!(read("<rgb name=\"reflectance\" value=\"2\"/>").is_err());
     }
 

@@ -42,7 +42,7 @@ fn see_light(scene: &Caster<'_>, camera: &[Vertex], techniques: &Techniques) -> 
     let (id, start) = match &end.kind {
         VertexKind::Environment(id) => (*id, Start::Infinite { towards: -end.back }),
         VertexKind::Surface(surface) => {
-            (surface.emitter?, Start::Surface { position: end.position, normal: surface.geometric, uv: surface.uv })
+            (surface.emitter?, Start::Surface { position: end.position, normal: surface.geometric, uv: surface.spot.uv })
         }
         _ => return None,
     };

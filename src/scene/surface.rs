@@ -2,7 +2,8 @@
 
 use super::{BsdfId, EmitterId, Origin};
 use crate::math::Frame;
-use glam::{DVec2, DVec3};
+use crate::texture::Spot;
+use glam::DVec3;
 
 /// A point on a surface.
 #[derive(Clone, Copy, Debug)]
@@ -15,8 +16,8 @@ pub struct Surface {
     pub frame: Frame,
     /// The shading normal before a relief tilted it, in the shading frame: +z where there is none.
     pub up: DVec3,
-    /// Where its textures are looked up: texture coordinates, or a place in the chart of its mesh.
-    pub uv: DVec2,
+    /// Where its textures are looked up.
+    pub spot: Spot,
     /// How it scatters.
     pub bsdf: BsdfId,
     /// Whether it shines.

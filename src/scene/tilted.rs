@@ -14,8 +14,8 @@
 use super::{Scene, Surface};
 use crate::bsdf::{Bsdf, Evaluation, Scatter};
 use crate::math::{Row, SolidAnglePdf, Walk};
-use crate::texture::Relief;
-use glam::{DVec2, DVec3};
+use crate::texture::{Relief, Spot};
+use glam::DVec3;
 
 /// The frame in which a direction meets the surface.
 #[derive(Clone, Copy, PartialEq)]
@@ -57,19 +57,19 @@ impl Relief {
 
 impl Scene {
     #[inline]
-    fn tilted(&self, at: &Surface) -> Option<Tilted<'_>> {
+    fn tilted<'a>(&'a self, at: &'a Surface) -> Option<Tilted<'a>> {
         if at.up.z >= 1.0 {
             return None;
         }
         let relief = self.reliefs[at.bsdf.0 as usize].as_ref()?;
-        Some(Tilted { bsdf: self.bsdf(at.bsdf), relief, up: at.up, uv: at.uv })
+        Some(Tilted { bsdf: self.bsdf(at.bsdf), relief, up: at.up, spot: &at.spot })
     }
 
     /// What scattering from `wi` to `wo` at a surface amounts to; see [`Bsdf::evaluate`].
     #[inline]
     pub fn evaluate(&self, at: &Surface, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
         match self.tilted(at) {
-            None => self.bsdf(at.bsdf).evaluate(at.uv, wi, wo, walk),
+            None => self.bsdf(at.bsdf).evaluate(&at.spot, wi, wo, walk),
             Some(tilted) => tilted.evaluate(wi, wo, walk),
         }
     }
@@ -78,7 +78,7 @@ impl Scene {
     #[inline]
     pub fn scatter(&self, at: &Surface, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
         match self.tilted(at) {
-            None => self.bsdf(at.bsdf).sample(at.uv, wi, row, walk),
+            None => self.bsdf(at.bsdf).sample(&at.spot, wi, row, walk),
             Some(tilted) => tilted.sample(wi, row, walk),
         }
     }
@@ -96,7 +96,7 @@ struct Tilted<'a> {
     relief: &'a Relief,
     /// The untilted normal.
     up: DVec3,
-    uv: DVec2,
+    spot: &'a Spot,
 }
 
 impl Tilted<'_> {
@@ -112,7 +112,7 @@ impl Tilted<'_> {
         };
         let within = |facing: Facing| {
             let admitted = facing.admits(wi) && facing.admits(wo);
-            let found = || self.bsdf.evaluate(self.uv, facing.turn(wi), facing.turn(wo), walk);
+            let found = || self.bsdf.evaluate(self.spot, facing.turn(wi), facing.turn(wo), walk);
             if admitted { found() } else { None }
         };
         let found = within(decides)?;
@@ -129,7 +129,7 @@ impl Tilted<'_> {
 
     fn sample(&self, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
         let own = self.facing(wi);
-        let sampled = self.bsdf.sample(self.uv, own.turn(wi), row, walk)?;
+        let sampled = self.bsdf.sample(self.spot, own.turn(wi), row, walk)?;
         let direction = own.turn(sampled.direction);
         if !own.admits(direction) {
             return None;
@@ -164,7 +164,7 @@ mod tests {
     use crate::scene::relief::{oriented, tilted};
     use crate::spectrum::Spectrum;
     use crate::texture::{Checkerboard, ReliefMap, Texture};
-    use glam::DAffine2;
+    use glam::{DAffine2, DVec2};
     use std::f64::consts::PI;
     use std::sync::Arc;
 
@@ -191,7 +191,7 @@ mod tests {
         let relief = relief();
         let frame = tilted(oriented(DVec3::Z, DVec3::X), &relief.map, [DVec2::ZERO; 2], [DVec3::X, DVec3::Y]);
         let up = frame.to_local(DVec3::Z);
-        check(Tilted { bsdf, relief: &relief, up, uv: DVec2::ZERO }, frame)
+        check(Tilted { bsdf, relief: &relief, up, spot: &Spot::default() }, frame)
     }
 
     /// Values times cosine, as Mitsuba 3.9.1 has them for a bump map with this slope: as it is, mirrored, from behind.

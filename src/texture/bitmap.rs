@@ -29,13 +29,8 @@ pub enum Wrap {
 }
 
 impl Wrap {
-    /// The pixel out of `count` that is seen in the place of pixel `index`, which is far outside where it saturates. No
-    /// division where it is one of them, as it nearly always is.
-    #[inline]
+    /// The pixel out of `count` that is seen in the place of pixel `index`, which is far outside where it saturates.
     fn apply(self, index: i32, count: i32) -> usize {
-        if (0..count).contains(&index) {
-            return index as usize;
-        }
         let inside = match self {
             Self::Repeat => index.rem_euclid(count),
             Self::Clamp => index.clamp(0, count - 1),
@@ -75,8 +70,11 @@ impl Bitmap {
         }
         let low = (place - 0.5).floor();
         let (x, y) = (low.x as i32, low.y as i32);
-        let columns = [column(x), column(x.saturating_add(1))];
-        let rows = [row(y), row(y.saturating_add(1))];
+        let within = x >= 0 && y >= 0 && x < width - 1 && y < height - 1;
+        let (columns, rows) = match within {
+            true => ([x as usize, x as usize + 1], [y as usize, y as usize + 1]),
+            false => ([x, x.saturating_add(1)].map(column), [y, y.saturating_add(1)].map(row)),
+        };
         self.picture.between(columns, rows, place - 0.5 - low, self.raw)
     }
 

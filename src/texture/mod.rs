@@ -4,11 +4,13 @@ pub mod attribute;
 mod bitmap;
 mod checkerboard;
 mod picture;
+mod spot;
 
 pub use attribute::{Attribute, Draped};
 pub use bitmap::{Bitmap, Lookup, Wrap};
 pub use checkerboard::Checkerboard;
 pub use picture::{Picture, Texels};
+pub use spot::Spot;
 
 use crate::spectrum::Spectrum;
 use glam::DVec2;
@@ -60,12 +62,12 @@ pub enum Colour {
 }
 
 impl Colour {
-    /// The colour at `uv`.
+    /// The colour at `spot`.
     #[inline]
-    pub fn at(&self, uv: DVec2) -> Spectrum {
+    pub fn at(&self, spot: &Spot) -> Spectrum {
         match self {
             Self::Constant(colour) => *colour,
-            Self::Textured(texture) => texture.colour(uv),
+            Self::Textured(texture) => spot.colour(texture),
         }
     }
 
@@ -74,6 +76,15 @@ impl Colour {
         match self {
             Self::Constant(colour) => *colour,
             Self::Textured(texture) => texture.mean(),
+        }
+    }
+
+    /// The texture that it has, if it varies.
+    #[inline]
+    pub fn texture(&self) -> Option<&Texture> {
+        match self {
+            Self::Constant(_) => None,
+            Self::Textured(texture) => Some(texture),
         }
     }
 
@@ -127,12 +138,12 @@ pub enum Number {
 }
 
 impl Number {
-    /// The number at `uv`.
+    /// The number at `spot`.
     #[inline]
-    pub fn at(&self, uv: DVec2) -> f64 {
+    pub fn at(&self, spot: &Spot) -> f64 {
         match self {
             Self::Constant(number) => *number,
-            Self::Textured(texture) => texture.colour(uv).luminance(),
+            Self::Textured(texture) => spot.colour(texture).luminance(),
         }
     }
 

@@ -99,26 +99,43 @@ impl Picture {
     fn weighted<const N: usize>(&self, pixels: [(usize, usize, f64); N], raw: bool) -> Spectrum {
         // One decision for all samples, not one for each.
         match &self.texels {
-            Texels::Bytes(samples) if raw => self.sum(pixels, |i| f64::from(samples[i]) * (1.0 / 255.0)),
+            Texels::Bytes(samples) if raw => self.sum(samples, pixels, |code| f64::from(code) * (1.0 / 255.0)),
             Texels::Bytes(samples) => {
                 let decoded: &[f64; 256] = &BYTES;
-                self.sum(pixels, |i| decoded[usize::from(samples[i])])
+                self.sum(samples, pixels, |code| decoded[usize::from(code)])
             }
-            Texels::Shorts(samples) if raw => self.sum(pixels, |i| f64::from(samples[i]) * (1.0 / 65535.0)),
+            Texels::Shorts(samples) if raw => self.sum(samples, pixels, |code| f64::from(code) * (1.0 / 65535.0)),
             Texels::Shorts(samples) => {
                 let decoded: &[f64] = &SHORTS;
-                self.sum(pixels, |i| decoded[usize::from(samples[i])])
+                self.sum(samples, pixels, |code| decoded[usize::from(code)])
             }
-            Texels::Halves(samples) => self.sum(pixels, |i| samples[i].to_f64()),
-            Texels::Floats(samples) => self.sum(pixels, |i| f64::from(samples[i])),
+            Texels::Halves(samples) => self.sum(samples, pixels, f16::to_f64),
+            Texels::Floats(samples) => self.sum(samples, pixels, f64::from),
         }
     }
 
-    #[inline]
-    fn sum<const N: usize>(&self, pixels: [(usize, usize, f64); N], sample: impl Fn(usize) -> f64) -> Spectrum {
-        let firsts = pixels.map(|(x, y, weight)| ((y * self.size[0] + x) * self.channels, weight));
-        let channel = |c: usize| firsts.iter().map(|(first, weight)| sample(first + c) * weight).sum();
-        if self.channels == 1 { Spectrum::grey(channel(0)) } else { Spectrum::rgb(channel(0), channel(1), channel(2)) }
+    #[inline(always)]
+    fn sum<T: Copy, const N: usize>(
+        &self,
+        samples: &[T],
+        pixels: [(usize, usize, f64); N],
+        decode: impl Fn(T) -> f64,
+    ) -> Spectrum {
+        let number = |(x, y)| y * self.size[0] + x;
+        if self.channels == 1 {
+            let sum = pixels.iter().map(|&(x, y, weight)| decode(samples[number((x, y))]) * weight).sum();
+            return Spectrum::grey(sum);
+        }
+        // In whole pixels, so that one check of bounds does for three samples.
+        let (whole, _) = samples.as_chunks::<3>();
+        let mut sum = [0.0; 3];
+        for (x, y, weight) in pixels {
+            let pixel = &whole[number((x, y))];
+            for (channel, code) in sum.iter_mut().zip(pixel) {
+                *channel += decode(*code) * weight;
+            }
+        }
+        Spectrum::rgb(sum[0], sum[1], sum[2])
     }
 
     /// The mean of all pixels.

@@ -47,7 +47,7 @@ fn samples_follow_the_density() {
 fn count(bsdf: &Bsdf, wi: DVec3, stream: &mut Stream) -> (Vec<f64>, f64) {
     let (mut counts, mut inside) = (vec![0.0; SIZE[0] * SIZE[1]], 0.0);
     for _ in 0..SAMPLES {
-        let scatter = bsdf.sample(UV, wi, stream.row(), Walk::FromCamera);
+        let scatter = bsdf.sample(&here(), wi, stream.row(), Walk::FromCamera);
         let Some(scatter) = scatter.filter(|scatter| !scatter.delta) else { continue };
         let [u, v] = warp::sphere::invert(scatter.direction);
         let bin = |x: f64, n: usize| ((x * n as f64) as usize).min(n - 1);
@@ -61,7 +61,7 @@ fn count(bsdf: &Bsdf, wi: DVec3, stream: &mut Stream) -> (Vec<f64>, f64) {
 fn expect(bsdf: &Bsdf, wi: DVec3) -> Vec<f64> {
     let pdf = |u: [f64; 2]| {
         let wo = warp::sphere::sample(u);
-        bsdf.evaluate(UV, wi, wo, Walk::FromCamera).map_or(0.0, |evaluation| evaluation.pdf.0) / warp::sphere::PDF.0
+        bsdf.evaluate(&here(), wi, wo, Walk::FromCamera).map_or(0.0, |evaluation| evaluation.pdf.0) / warp::sphere::PDF.0
     };
     let [rows, columns] = SIZE.map(|n| 1.0 / n as f64);
     let bin = |i: usize| [(i / SIZE[1]) as f64 * rows, (i % SIZE[1]) as f64 * columns];

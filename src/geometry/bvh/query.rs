@@ -1,6 +1,7 @@
 //! What a traversal needs to know about a ray, computed once.
 
 use glam::{DVec3, Vec3};
+use std::hint::select_unpredictable as select;
 
 use super::frame::Frame;
 use crate::geometry::Ray;
@@ -59,14 +60,19 @@ impl Query {
             clip(origin, ray.direction, tmax)?
         };
         let size = ray.direction.abs();
-        let axes = if size.x > size.y && size.x > size.z {
-            [1, 2, 0]
-        } else if size.y > size.z {
-            [2, 0, 1]
-        } else {
-            [0, 1, 2]
+        // Which axis is the largest cannot be foreseen: chosen without branches.
+        let first = size.x > size.y && size.x > size.z;
+        let second = !first && size.y > size.z;
+        let last = select(first, 0, select(second, 1, 2));
+        let next = select(first, 1, select(second, 2, 0));
+        let axes = [next, 3 - next - last, last];
+        let permute = |v: DVec3| {
+            [
+                select(first, v.y, select(second, v.z, v.x)),
+                select(first, v.z, select(second, v.x, v.y)),
+                select(first, v.x, select(second, v.y, v.z)),
+            ]
         };
-        let permute = |v: DVec3| [v[axes[0]], v[axes[1]], v[axes[2]]];
         let (direction, place) = (permute(ray.direction), permute(point));
         let unit = 1.0 / direction[2];
         let shear = [direction[0] * unit, direction[1] * unit, unit];
