@@ -26,17 +26,35 @@ fn methods(criterion: &mut Criterion) {
     }
 }
 
-/// The box as it is, and with every colour as a bitmap of 512 × 512 pixels: the same picture, so that the difference is
-/// the price of looking textures up.
+/// The box as it is, and with every colour as a bitmap: the same picture, so that the difference is the price of looking
+/// textures up; with 512 × 512 pixels that of memory beyond the near cache too.
 fn textures(criterion: &mut Criterion) {
     let folder = tempfile::tempdir().expect("a folder");
     let text = include_str!("../scenes/box/scene.xml");
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+    let settings = Settings { seed: 1, max_depth: 10, features: false, budget: Budget::Passes(8) };
+    let mut group = criterion.benchmark_group("box 128x128, path, one thread");
+    group.sample_size(20);
+    for (name, side) in [("constant", None), ("bitmaps of 16x16", Some(16)), ("bitmaps of 512x512", Some(512))] {
+        let file = folder.path().join("scene.xml");
+        let text = side.map_or_else(|| text.to_owned(), |side| textured(text, side, folder.path()));
+        std::fs::write(&file, text).expect("a scene");
+        let options = load::Options { size: Some([128, 128]), ..load::Options::default() };
+        let scene = load::read(&file, &options).expect("the box loads").scene;
+        let run = || pool.install(|| render(&scene, Method::Path, &settings, |_| {}));
+        group.throughput(Throughput::Elements(run().counts.rays));
+        group.bench_function(BenchmarkId::new(name, "rays"), |b| b.iter(run));
+    }
+}
+
+/// A scene whose reflectances are bitmaps of `side` × `side` pixels, written to `folder`.
+fn textured(text: &str, side: u32, folder: &Path) -> String {
     let colour = |value: &str| {
         let rgb: Vec<u8> =
             value.split(',').map(|v| (255.0 * v.trim().parse::<f64>().expect("a number")) as u8).collect();
-        let name = format!("{}.png", value.replace([',', ' '], "_"));
-        let pixels = image::RgbImage::from_pixel(512, 512, image::Rgb([rgb[0], rgb[1], rgb[2]]));
-        pixels.save(folder.path().join(&name)).expect("a picture");
+        let name = format!("{}_{side}.png", value.replace([',', ' '], "_"));
+        let pixels = image::RgbImage::from_pixel(side, side, image::Rgb([rgb[0], rgb[1], rgb[2]]));
+        pixels.save(folder.join(&name)).expect("a picture");
         let raw = "<boolean name=\"raw\" value=\"true\"/>";
         format!(
             "<texture type=\"bitmap\" name=\"reflectance\"><string name=\"filename\" value=\"{name}\"/>{raw}</texture>"
@@ -51,20 +69,7 @@ fn textures(criterion: &mut Criterion) {
         textured += &colour(value);
         rest = tail;
     }
-    textured += rest;
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
-    let settings = Settings { seed: 1, max_depth: 10, features: false, budget: Budget::Passes(8) };
-    let mut group = criterion.benchmark_group("box 128x128, path, one thread");
-    group.sample_size(20);
-    for (name, text) in [("constant", text), ("textured", &textured)] {
-        let file = folder.path().join(format!("{name}.xml"));
-        std::fs::write(&file, text).expect("a scene");
-        let options = load::Options { size: Some([128, 128]), ..load::Options::default() };
-        let scene = load::read(&file, &options).expect("the box loads").scene;
-        let run = || pool.install(|| render(&scene, Method::Path, &settings, |_| {}));
-        group.throughput(Throughput::Elements(run().counts.rays));
-        group.bench_function(BenchmarkId::new(name, "rays"), |b| b.iter(run));
-    }
+    textured + rest
 }
 
 criterion_group!(benches, methods, textures);

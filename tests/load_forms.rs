@@ -7,6 +7,7 @@ use pathblend::bsdf::Bsdf;
 use pathblend::emitter::Emitter;
 use pathblend::load::{self, Loaded, Options};
 use pathblend::scene::{Caster, Scene};
+use pathblend::texture::Spot;
 use std::path::Path;
 
 const SENSOR: &str = "<sensor type=\"perspective\"><float name=\"fov\" value=\"60\"/></sensor>";

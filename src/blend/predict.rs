@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::BlendError;
 use super::features::{FeatureSet, Features, STRIDE, TILE, Tile};
 use super::planes::Planes;
-use crate::forest::{Forest, Lanes, Linear, Model};
+use crate::forest::{Forest, LANES, Lanes, Linear, Model};
 
 /// The weight of a pixel of which nothing is known (thesis, section 5.5).
 pub(super) const UNKNOWN: f32 = 0.5;
@@ -22,8 +22,8 @@ pub(super) fn feature_set(model: &Model) -> Result<FeatureSet, BlendError> {
 pub(super) fn forest_weights(forest: &Forest, set: FeatureSet, planes: &Planes<'_>) -> Vec<f32> {
     let used: Vec<&str> = forest.used_features().iter().map(|&f| forest.features()[usize::from(f)].as_str()).collect();
     let features = Features::new(set, planes, Some(&used));
-    let lanes = Lanes::new(forest, &positions(forest.features(), &features), STRIDE);
-    weights(&features, planes.pixels, |tile, out| lanes.predict(&tile.values, out))
+    let lanes = Lanes::new(forest, &positions(forest.features(), &features), STRIDE / LANES);
+    weights(&features, planes.pixels, |tile, out| lanes.predict(tile.values.as_chunks().0, out))
 }
 
 /// The same by the linear baseline.

@@ -58,7 +58,8 @@ impl Blend {
     pub(super) fn invert(&self, spot: &Spot, wi: DVec3, wo: DVec3, delta: bool, gamma: Row) -> Option<Row> {
         let shares = self.shares(spot);
         let densities = if delta {
-            let misses = [0, 1].map(|i| if shares[i] > 0.0 { self.miss(i, spot, wi, wo, gamma) } else { f64::INFINITY });
+            let misses =
+                [0, 1].map(|i| if shares[i] > 0.0 { self.miss(i, spot, wi, wo, gamma) } else { f64::INFINITY });
             let nearest = misses[0].min(misses[1]);
             [0, 1].map(|i| if misses[i] < nearest + SAME { shares[i] } else { 0.0 })
         } else {

@@ -70,7 +70,8 @@ impl Coating {
             .rough
             .as_ref()
             .map(|rough| rough.evaluate(wi, wo).scaled(self.specular_reflectance.at(spot), i.layer, o.layer));
-        let base = (i.pass > 0.0 && o.pass > 0.0).then(|| self.nested.evaluate(spot, i.inside, o.inside, walk)).flatten();
+        let base =
+            (i.pass > 0.0 && o.pass > 0.0).then(|| self.nested.evaluate(spot, i.inside, o.inside, walk)).flatten();
         let base = base.map(|base| {
             // Radiance is squeezed by η² on the way in; cosines and solid angles outside are other ones.
             let factor = self.absorption(&i, &o) * (i.pass * o.pass / (self.eta * self.eta));

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use super::rows::MAX_FEATURES;
-use super::tree::{Forest, LEAF, MAX_DEPTH, Node, Tree};
+use super::tree::{Forest, LEAF, MAX_DEPTH, MAX_NODES, Node, Tree};
 use super::{ForestError, Rows};
 
 /// What the `format` field of every model file says.
@@ -182,11 +182,9 @@ impl TreeDocument {
     /// cannot describe a cycle; it can only end too early or too late.
     fn check(&self, features: usize) -> Result<Tree, (String, String)> {
         let (n, m) = (self.feature.len(), self.value.len());
-        if n != m || n == 0 || n >= u32::MAX as usize {
-            return Err((
-                format!("{n} features and {m} values"),
-                "as many of one as of the other, at least one".into(),
-            ));
+        if n != m || !(1..=MAX_NODES).contains(&n) {
+            let expected = format!("as many of one as of the other, 1 to {MAX_NODES}");
+            return Err((format!("{n} features and {m} values"), expected));
         }
         let mut nodes = Vec::with_capacity(n);
         // Splits whose upper child is still to come.

@@ -18,9 +18,9 @@ mod tree;
 
 pub use error::ForestError;
 pub use file::{FORMAT, MAX_FILE_BYTES, Model, VERSION};
-pub(crate) use lanes::Lanes;
+pub(crate) use lanes::{LANES, Lanes};
 pub use linear::Linear;
 pub use quality::Quality;
 pub use rows::{MAX_FEATURES, Rows, SplitBy};
 pub use train::{Settings, train};
-pub use tree::{Forest, LEAF, MAX_DEPTH, Node, Tree};
+pub use tree::{Forest, LEAF, MAX_DEPTH, MAX_NODES, Node, Tree};

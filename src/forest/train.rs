@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::binned::Binned;
 use super::grow::{Sample, grow};
 use super::refine::refine;
-use super::{Forest, ForestError, LEAF, MAX_DEPTH, Rows, SplitBy, Tree};
+use super::{Forest, ForestError, LEAF, MAX_DEPTH, MAX_NODES, Rows, SplitBy, Tree};
 
 /// How a forest is grown. The defaults are the thesis's where it gives any (section 5.5): 5 trees, depth 15, 100 KB.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -18,7 +18,7 @@ pub struct Settings {
     pub trees: usize,
     /// Most splits between root and leaf, up to [`MAX_DEPTH`] = 64.
     pub max_depth: usize,
-    /// Most leaves per tree, 1 to 1 000 000. A leaf and its split take about 20 bytes in the file: 5 trees of 700 leaves stay
+    /// Most leaves per tree, 1 to 32 768. A leaf and its split take about 20 bytes in the file: 5 trees of 700 leaves stay
     /// below 100 KB.
     pub max_leaves: usize,
     /// Fewest rows per leaf, ≥ 1.
@@ -76,8 +76,8 @@ impl Settings {
         if self.max_depth > MAX_DEPTH {
             return wrong("max_depth", self.max_depth.to_string(), "0 to 64");
         }
-        if !(1..=1_000_000).contains(&self.max_leaves) {
-            return wrong("max_leaves", self.max_leaves.to_string(), "1 to 1000000");
+        if !(1..=MAX_NODES.div_ceil(2)).contains(&self.max_leaves) {
+            return wrong("max_leaves", self.max_leaves.to_string(), "1 to 32768");
         }
         if self.min_rows < 1 {
             return wrong("min_rows", self.min_rows.to_string(), "1 or more");

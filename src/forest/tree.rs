@@ -7,6 +7,9 @@ use super::Rows;
 /// Most splits between a tree's root and any leaf, grown or loaded.
 pub const MAX_DEPTH: usize = 64;
 
+/// Most nodes of a tree, grown or loaded: half a megabyte, and what two bytes can number.
+pub const MAX_NODES: usize = u16::MAX as usize;
+
 /// `Node::feature` of a leaf.
 pub const LEAF: u16 = u16::MAX;
 

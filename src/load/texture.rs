@@ -171,8 +171,8 @@ mod tests {
 
     use super::super::document::with_root;
     use super::*;
-    use crate::texture::Spot;
     use crate::image::{Image, WriteOptions};
+    use crate::texture::Spot;
     use ::image::{Rgb, RgbImage};
     use std::path::Path;
 

@@ -61,7 +61,8 @@ fn count(bsdf: &Bsdf, wi: DVec3, stream: &mut Stream) -> (Vec<f64>, f64) {
 fn expect(bsdf: &Bsdf, wi: DVec3) -> Vec<f64> {
     let pdf = |u: [f64; 2]| {
         let wo = warp::sphere::sample(u);
-        bsdf.evaluate(&here(), wi, wo, Walk::FromCamera).map_or(0.0, |evaluation| evaluation.pdf.0) / warp::sphere::PDF.0
+        bsdf.evaluate(&here(), wi, wo, Walk::FromCamera).map_or(0.0, |evaluation| evaluation.pdf.0)
+            / warp::sphere::PDF.0
     };
     let [rows, columns] = SIZE.map(|n| 1.0 / n as f64);
     let bin = |i: usize| [(i / SIZE[1]) as f64 * rows, (i % SIZE[1]) as f64 * columns];
