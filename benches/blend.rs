@@ -17,7 +17,8 @@ fn pairs(criterion: &mut Criterion) {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).join("scene.xml");
         let options = load::Options { size: Some([1280, 720]), ..load::Options::default() };
         let scene = load::read(&file, &options).expect("the scene loads").scene;
-        let settings = Settings { seed: 1, max_depth: 10, features: true, budget: Budget::Passes(2) };
+        let settings =
+            Settings { seed: 1, max_depth: 10, features: true, budget: Budget::Passes(2), ..Settings::default() };
         let [a, b] = [Method::Bdpt, Method::Sppm].map(|method| render(&scene, method, &settings, |_| {}).image);
         let run = || blend::apply(&model, Input::new("a", &a), Input::new("b", &b), Classes::Drop).expect("they fit");
         group.throughput(Throughput::Elements(1280 * 720));

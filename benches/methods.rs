@@ -13,7 +13,8 @@ fn methods(criterion: &mut Criterion) {
     let options = load::Options { size: Some([128, 128]), ..load::Options::default() };
     let scene = load::read(&file, &options).expect("the box loads").scene;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
-    let settings = Settings { seed: 1, max_depth: 10, features: true, budget: Budget::Passes(4) };
+    let settings =
+        Settings { seed: 1, max_depth: 10, features: true, budget: Budget::Passes(4), ..Settings::default() };
     for method in [Method::Path, Method::Bdpt, Method::Sppm, Method::Vcm, Method::Mmlt] {
         let run = || pool.install(|| render(&scene, method, &settings, |_| {}));
         let counts = run().counts;
@@ -32,7 +33,8 @@ fn textures(criterion: &mut Criterion) {
     let folder = tempfile::tempdir().expect("a folder");
     let text = include_str!("../scenes/box/scene.xml");
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
-    let settings = Settings { seed: 1, max_depth: 10, features: false, budget: Budget::Passes(8) };
+    let settings =
+        Settings { seed: 1, max_depth: 10, features: false, budget: Budget::Passes(8), ..Settings::default() };
     let mut group = criterion.benchmark_group("box 128x128, path, one thread");
     group.sample_size(20);
     for (name, side) in [("constant", None), ("bitmaps of 16x16", Some(16)), ("bitmaps of 512x512", Some(512))] {

@@ -59,8 +59,13 @@ fn diffuse(reflectance: f64) -> Bsdf {
 fn mean(scene: &Scene, method: Method, passes: u64, value: impl Fn(&Image) -> f64) -> (f64, f64) {
     let values: Vec<f64> = (0..SEEDS)
         .map(|seed| {
-            let settings =
-                Settings { seed, max_depth: scene.max_depth, features: true, budget: Budget::Passes(passes) };
+            let settings = Settings {
+                seed,
+                max_depth: scene.max_depth,
+                features: true,
+                budget: Budget::Passes(passes),
+                ..Settings::default()
+            };
             let outcome = render(scene, method, &settings, |_| {});
             assert_eq!(outcome.health, Default::default(), "{method:?} made invalid contributions");
             value(&outcome.image)
@@ -101,7 +106,7 @@ fn a_glowing_room_is_a_geometric_series() {
     builder.mesh(room(), paint, Some(Spectrum::ONE.into())).unwrap();
     // Off the corners: there a photon gather's disk reaches past the wall.
     let scene = build(builder, camera(DVec3::new(0.1, 0.2, 0.0), DVec3::new(0.05, 0.02, 1.0), 0.3), max_depth);
-    for method in METHODS {
+    for method in METHODS.into_iter().chain([Method::Light]) {
         let sum: f64 = (0..max_depth).map(|n| reflectance.powi(n as i32)).sum();
         expect(&scene, method, 16, "beauty", sum, colour_mean);
         for (bounces, word) in ["LE", "LDE", "LDDE", "LDDDE", "LDDDDE"].into_iter().enumerate() {
@@ -189,7 +194,7 @@ fn a_point_light_in_a_glass_ball_shines_as_if_it_were_bare() {
         reflectance / std::f64::consts::PI * intensity * height / distance_squared.powf(1.5)
     };
     let expected = (0..n * n).map(radiance).sum::<f64>() / (n * n) as f64;
-    for method in [Method::Bdpt, Method::Sppm, Method::Vcm, Method::Mmlt] {
+    for method in [Method::Light, Method::Bdpt, Method::Sppm, Method::Vcm, Method::Mmlt] {
         expect(&scene, method, 250, "beauty", expected, colour_mean);
         // The first interface lets 96 % pass, and each way back again 96 % of the rest.
         let class = |image: &Image| layer_mean(image, "path_LSDE");
@@ -253,7 +258,8 @@ fn the_unbiased_methods_agree_class_by_class() {
     };
     let runs = |method, passes| -> Vec<Vec<f64>> {
         let one = |seed| {
-            let settings = Settings { seed, max_depth: 6, features: true, budget: Budget::Passes(passes) };
+            let settings =
+                Settings { seed, max_depth: 6, features: true, budget: Budget::Passes(passes), ..Settings::default() };
             values(&render(&scene, method, &settings, |_| {}).image)
         };
         (0..SEEDS).map(one).collect()

@@ -51,7 +51,13 @@ fn expect(scene: &Scene, passes: u64, irradiance: f64) {
     for method in METHODS {
         let means: Vec<f64> = (0..SEEDS)
             .map(|seed| {
-                let settings = Settings { seed, max_depth: 3, features: false, budget: Budget::Passes(passes) };
+                let settings = Settings {
+                    seed,
+                    max_depth: 3,
+                    features: false,
+                    budget: Budget::Passes(passes),
+                    ..Settings::default()
+                };
                 let outcome = render(scene, method, &settings, |_| {});
                 assert_eq!(outcome.health, Default::default(), "{method:?} made invalid contributions");
                 outcome.image.colour.iter().map(|v| f64::from(*v)).sum::<f64>() / outcome.image.colour.len() as f64

@@ -74,7 +74,8 @@ fn compare(name: &str, method: Method, passes: u64) -> Result<Row, String> {
     let runs: Vec<Vec<f64>> = (0..RUNS)
         .map(|seed| {
             let budget = Budget::Passes(passes);
-            let settings = Settings { seed, max_depth: scene.max_depth, features: false, budget };
+            let settings =
+                Settings { seed, max_depth: scene.max_depth, features: false, budget, ..Settings::default() };
             means(&render(&scene, method, &settings, |_| {}).image.colour)
         })
         .collect();

@@ -102,7 +102,8 @@ fn images_are_not_mirrored() {
         let output = folder.path().join("out.xml");
         import(&folder.path().join("s.pbrt"), &output, &Options::default()).unwrap();
         let scene = load::read(&output, &load::Options::default()).unwrap().scene;
-        let settings = Settings { seed: 1, max_depth: 1, features: false, budget: Budget::Passes(400) };
+        let settings =
+            Settings { seed: 1, max_depth: 1, features: false, budget: Budget::Passes(400), ..Settings::default() };
         let image = render(&scene, Method::Path, &settings, |_| ()).image.colour;
         let (mut sum, mut centre) = (0.0, [0.0; 2]);
         for ((row, column, _), light) in image.indexed_iter() {

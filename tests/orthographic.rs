@@ -15,8 +15,13 @@ fn tiles(scene: &pathblend::scene::Scene, method: Method, passes: u64) -> Vec<(f
     let columns = scene.camera.size[0] / TILE;
     let runs: Vec<Vec<f64>> = (0..RUNS)
         .map(|seed| {
-            let settings =
-                Settings { seed, max_depth: scene.max_depth, features: false, budget: Budget::Passes(passes) };
+            let settings = Settings {
+                seed,
+                max_depth: scene.max_depth,
+                features: false,
+                budget: Budget::Passes(passes),
+                ..Settings::default()
+            };
             let image = render(scene, method, &settings, |_| {}).image.colour;
             let mut sums = vec![0.0; columns * scene.camera.size[1] / TILE];
             for ((y, x, channel), value) in image.indexed_iter() {

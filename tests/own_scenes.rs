@@ -30,7 +30,13 @@ fn scene(name: &str, size: [usize; 2]) -> Scene {
 }
 
 fn image(scene: &Scene, method: Method, seed: u64, passes: u64) -> Image {
-    let settings = Settings { seed, max_depth: scene.max_depth, features: true, budget: Budget::Passes(passes) };
+    let settings = Settings {
+        seed,
+        max_depth: scene.max_depth,
+        features: true,
+        budget: Budget::Passes(passes),
+        ..Settings::default()
+    };
     render(scene, method, &settings, |_| {}).image
 }
 

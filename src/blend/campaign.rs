@@ -255,6 +255,7 @@ impl Task<'_> {
             max_depth: self.scene.max_depth,
             features: true,
             budget: Budget::Cpu(Duration::from_secs_f64(self.time)),
+            ..Settings::default()
         };
         let outcome = render(self.scene, self.method, &settings, |_| {});
         outcome.image.write(&path, &WriteOptions::default()).map_err(|error| failed(self.name, error))

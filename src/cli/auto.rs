@@ -75,6 +75,7 @@ impl Auto {
             max_depth: scene.max_depth,
             features: true,
             budget: Budget::Wall(self.time / 2),
+            ..Settings::default()
         };
         let mut reporter = Reporter::new(method.name());
         let outcome = render(scene, method, &settings, |progress| reporter.update(progress));

@@ -4,6 +4,8 @@ use super::progress::Reporter;
 use super::{SceneArguments, check_output, on_threads, parse_time, say};
 use crate::image::{Precision, WriteOptions, write_png};
 use crate::integrators::{Budget, Method, Settings, render};
+use crate::paths::Heuristic;
+use crate::scene::LightChoice;
 use clap::Args;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -30,6 +32,8 @@ pub(super) struct Render {
     /// Threads; default: all cores.
     #[arg(long, value_name = "N", value_parser = parse_threads)]
     threads: Option<usize>,
+    #[command(flatten)]
+    tuning: Tuning,
     /// Image to write: OpenEXR with one layer per path class.
     #[arg(short, long, value_name = "OUT.exr")]
     output: PathBuf,
@@ -50,6 +54,47 @@ pub(super) struct Render {
     json: bool,
 }
 
+/// How methods do what they do. Each option says which methods hear it.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Tuning")]
+pub(super) struct Tuning {
+    /// How techniques are weighted against each other: path, bdpt, sppm, vcm.
+    #[arg(long, value_enum, default_value_t = Heuristic::Power)]
+    heuristic: Heuristic,
+    /// How lights are chosen for direct light: all but light and mmlt.
+    #[arg(long, value_enum, default_value_t = LightChoice::Position)]
+    lights: LightChoice,
+    /// Light subpaths per pass, up to 16777216: sppm, vcm. Default: one per pixel, up to 1048576 (vcm: 131072).
+    #[arg(long, value_name = "N", value_parser = parse_photons)]
+    photons: Option<usize>,
+    /// First radius in pixels: sppm, vcm.
+    #[arg(long, value_name = "PIXELS", default_value_t = Settings::default().radius, value_parser = parse_radius)]
+    radius: f64,
+    /// Estimate direct light by photons too: sppm.
+    #[arg(long)]
+    direct_by_photons: bool,
+}
+
+impl Tuning {
+    /// `settings` with these options.
+    pub(super) fn applied(&self, settings: Settings) -> Settings {
+        let Self { heuristic, lights, photons, radius, direct_by_photons } = *self;
+        Settings { heuristic, lights, photons, radius, sample_direct: !direct_by_photons, ..settings }
+    }
+}
+
+/// A number of light subpaths whose photons fit into some gigabytes.
+fn parse_photons(text: &str) -> Result<usize, String> {
+    let number = text.parse().ok().filter(|n| (1..=1 << 24).contains(n));
+    number.ok_or_else(|| "expected a number from 1 to 16777216".to_owned())
+}
+
+/// A radius in pixels.
+fn parse_radius(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|radius| *radius > 0.0 && *radius <= 1e4);
+    number.ok_or_else(|| "expected a number of pixels above 0, at most 10000".to_owned())
+}
+
 /// A number of threads that a machine can have.
 pub(super) fn parse_threads(text: &str) -> Result<usize, String> {
     text.parse().ok().filter(|n| (1..=1024).contains(n)).ok_or_else(|| "expected a number from 1 to 1024".to_owned())
@@ -66,7 +111,11 @@ impl Render {
             (Some(passes), _) => Budget::Passes(passes),
             (None, time) => Budget::Wall(time.unwrap_or(DEFAULT_TIME)),
         };
-        let settings = Settings { seed: self.seed, max_depth: scene.max_depth, features: !self.no_features, budget };
+        let (seed, max_depth, features) = (self.seed, scene.max_depth, !self.no_features);
+        let settings = self.tuning.applied(Settings { seed, max_depth, features, budget, ..Settings::default() });
+        if self.integrator == Method::Sppm && !scene.gathers() {
+            eprintln!("warning: nothing in the scene scatters diffuse-like, so sppm has nowhere to gather photons");
+        }
         let mut reporter = Reporter::new(self.integrator.name());
         let outcome = on_threads(self.threads, || render(&scene, self.integrator, &settings, |p| reporter.update(p)))?;
         reporter.finish();

@@ -127,6 +127,16 @@ impl Facet {
         Self { corner: a, edges, normal: cross.normalize_or_zero(), area: 0.5 * cross.length(), uvs }
     }
 
+    /// The corners.
+    pub(super) fn corners(&self) -> [DVec3; 3] {
+        [self.corner, self.corner + self.edges[0], self.corner + self.edges[1]]
+    }
+
+    /// Unit normal on the shining side.
+    pub(super) fn normal(&self) -> DVec3 {
+        self.normal
+    }
+
     /// Texture coordinates at the barycentric coordinates of the second and the third corner.
     #[inline]
     fn uv(&self, at: DVec2) -> DVec2 {
@@ -144,6 +154,11 @@ impl Area {
     pub fn new(radiance: Colour, surface: Surface) -> Self {
         let power = surface.integral(&radiance) * PI;
         Self { radiance, inverse_area: 1.0 / surface.area(), surface, power }
+    }
+
+    /// The surface that shines.
+    pub(super) fn surface(&self) -> &Surface {
+        &self.surface
     }
 
     #[inline]

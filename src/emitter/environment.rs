@@ -48,6 +48,11 @@ pub struct Environment {
 }
 
 impl Environment {
+    /// The scene around which it lies.
+    pub(super) fn reach(&self) -> &Reach {
+        &self.reach
+    }
+
     /// An environment around a scene within `reach`; `None` when it is black.
     pub fn new(backdrop: Backdrop, reach: Reach) -> Option<Self> {
         let image = backdrop.image.as_ref().map_or(0.0, |(image, _)| image.integral());

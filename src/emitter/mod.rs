@@ -7,6 +7,7 @@ mod area;
 mod constant;
 mod directional;
 mod environment;
+mod extent;
 mod panorama;
 mod point;
 mod reach;
@@ -14,15 +15,18 @@ pub mod sky;
 mod spot;
 #[cfg(test)]
 mod tests;
+mod tree;
 
 pub use area::{Area, Surface};
 pub use constant::Constant;
 pub use directional::Directional;
 pub use environment::{Backdrop, Environment, Sun};
+pub use extent::{Cone, Extent};
 pub use panorama::Panorama;
 pub use point::Point;
 pub use reach::Reach;
 pub use spot::Spot;
+pub use tree::LightTree;
 
 use crate::math::{AreaPdf, Row, SolidAnglePdf};
 use crate::spectrum::Spectrum;

@@ -5,8 +5,10 @@ use super::path::film_position;
 use super::{Counts, render::Settings};
 use crate::film::{Band, Film, Kernel, Splats};
 use crate::math::Stream;
-use crate::paths::{Connection, Random, Subpath, Techniques, Vertex, connect, light_vertex, trace_camera, trace_light};
-use crate::scene::{Caster, Scene};
+use crate::paths::{
+    Connection, Random, Subpath, Techniques, Vertex, connect, light_vertex_for, trace_camera, trace_light,
+};
+use crate::scene::{Caster, LightChoice, Scene};
 
 /// Vertices of a subpath before Russian roulette sets in.
 pub(super) const ROULETTE_FROM: usize = 5;
@@ -15,6 +17,8 @@ pub(super) const ROULETTE_FROM: usize = 5;
 pub(super) struct Bdpt {
     seed: u64,
     max_depth: usize,
+    techniques: Techniques,
+    lights: LightChoice,
 }
 
 /// What one job needs, reused from path to path.
@@ -30,7 +34,8 @@ struct Job<'a> {
 
 impl Bdpt {
     pub(super) fn start(settings: &Settings) -> Self {
-        Self { seed: settings.seed, max_depth: settings.max_depth }
+        let Settings { seed, max_depth, heuristic, lights, .. } = *settings;
+        Self { seed, max_depth, techniques: Techniques::connections(heuristic), lights }
     }
 
     pub(super) fn pass(&self, scene: &Scene, film: &mut Film, pass: u64, counts: &mut Counts) {
@@ -38,7 +43,7 @@ impl Bdpt {
         let size = film.size;
         let jobs = film.for_each_band(|index, band| {
             let mut job = Job {
-                scene: Caster::new(scene),
+                scene: Caster::choosing(scene, self.lights),
                 kernel: &kernel,
                 size,
                 stream: Stream::new(self.seed, &[pass, index as u64]),
@@ -47,7 +52,7 @@ impl Bdpt {
                 splats: Splats::new(size),
             };
             for pixel in band.pixels() {
-                job.sample(pixel, self.max_depth, band);
+                job.sample(pixel, self, band);
             }
             (job.splats, job.scene.rays())
         });
@@ -58,7 +63,8 @@ impl Bdpt {
 }
 
 impl Job<'_> {
-    fn sample(&mut self, pixel: [usize; 2], max_depth: usize, band: &mut Band) {
+    fn sample(&mut self, pixel: [usize; 2], bdpt: &Bdpt, band: &mut Band) {
+        let max_depth = bdpt.max_depth;
         let first = self.stream.row();
         let film = film_position(self.kernel, self.size, pixel, first);
         let rows = &mut Random(&mut self.stream);
@@ -67,7 +73,7 @@ impl Job<'_> {
         trace_light(&self.scene, rows, max_depth, ROULETTE_FROM, &mut self.light);
         let Self { scene, kernel, stream, camera, light, splats, .. } = self;
         let (camera, light) = (&camera.vertices, &light.vertices);
-        connect_all(scene, light, camera, 1, max_depth, &Techniques::CONNECTIONS, stream, |found| match found.film {
+        connect_all(scene, light, camera, 1, max_depth, &bdpt.techniques, stream, |found| match found.film {
             Some(film) => splats.add(kernel, film, found.class, found.value),
             None => band.add(pixel, found.class, found.value),
         });
@@ -95,7 +101,9 @@ pub(super) fn connect_all(
             }
             let fresh;
             let start = if s == 1 {
-                let Some(vertex) = light_vertex(scene, stream.row()) else { continue };
+                // Lights that the camera sees are left to s = 0, and a walk may end in the environment.
+                let Some(surface) = camera[t - 1].surface() else { continue };
+                let Some(vertex) = light_vertex_for(scene, surface.position, stream.row()) else { continue };
                 fresh = [vertex];
                 &fresh[..]
             } else {

@@ -11,12 +11,15 @@ use super::{Acceptance, Counts, path::Path, render::Settings};
 use crate::film::{Film, Health, Kernel, PathClass, Splats};
 use crate::markov::{ChainState, LARGE_STEP_PROBABILITY};
 use crate::math::{Discrete, Stream};
-use crate::paths::{Subpath, Techniques, connect, trace_camera, trace_light};
+use crate::paths::{Heuristic, Subpath, Techniques, connect, trace_camera, trace_light};
 use crate::scene::{Caster, Scene};
 use crate::spectrum::Spectrum;
 use glam::DVec2;
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
+
+/// The primary samples of a path do not know where its light is to arrive: lights are chosen by power.
+const TECHNIQUES: Techniques = Techniques::connections(Heuristic::Power);
 
 /// Longest path that is left to path tracing.
 const DIRECT_DEPTH: usize = 2;
@@ -265,7 +268,7 @@ impl Lane {
         if self.light.vertices.len() != s {
             return None;
         }
-        let found = connect(scene, &self.light.vertices, &self.camera.vertices, &Techniques::CONNECTIONS)?;
+        let found = connect(scene, &self.light.vertices, &self.camera.vertices, &TECHNIQUES)?;
         let value = found.value * techniques as f64;
         let luminance = value.luminance();
         (self.health.accepts(value) && luminance > 0.0).then_some(Contribution {

@@ -5,6 +5,7 @@
 
 mod bdpt;
 mod grid;
+mod light;
 mod mmlt;
 mod path;
 mod photons;
@@ -12,6 +13,7 @@ mod render;
 mod sppm;
 mod vcm;
 
+pub use photons::MOST_PHOTONS;
 pub use render::{Budget, Outcome, Progress, Settings, render};
 
 use crate::film::Film;
@@ -25,6 +27,8 @@ use std::collections::BTreeMap;
 pub enum Method {
     /// Path tracing from the camera with next event estimation.
     Path,
+    /// Path tracing from the lights: what no mirror and no smooth glass hides from them.
+    Light,
     /// Bidirectional path tracing, all techniques.
     Bdpt,
     /// Stochastic progressive photon mapping.
@@ -40,6 +44,7 @@ impl Method {
     pub fn name(self) -> &'static str {
         match self {
             Self::Path => "path",
+            Self::Light => "light",
             Self::Bdpt => "bdpt",
             Self::Sppm => "sppm",
             Self::Vcm => "vcm",
@@ -80,6 +85,7 @@ impl Counts {
 /// A running method.
 enum Integrator {
     Path(path::Path),
+    Light(light::Light),
     Bdpt(bdpt::Bdpt),
     Sppm(sppm::Sppm),
     Vcm(vcm::Vcm),
@@ -90,6 +96,7 @@ impl Integrator {
     fn start(method: Method, scene: &Scene, settings: &Settings) -> Self {
         match method {
             Method::Path => Self::Path(path::Path::start(settings)),
+            Method::Light => Self::Light(light::Light::start(settings)),
             Method::Bdpt => Self::Bdpt(bdpt::Bdpt::start(settings)),
             Method::Sppm => Self::Sppm(sppm::Sppm::start(scene, settings)),
             Method::Vcm => Self::Vcm(vcm::Vcm::start(scene, settings)),
@@ -101,6 +108,7 @@ impl Integrator {
     fn pass(&mut self, scene: &Scene, film: &mut Film, pass: u64, counts: &mut Counts) {
         match self {
             Self::Path(path) => path.pass(scene, film, pass, counts),
+            Self::Light(light) => light.pass(scene, film, pass, counts),
             Self::Bdpt(bdpt) => bdpt.pass(scene, film, pass, counts),
             Self::Sppm(sppm) => sppm.pass(scene, film, pass, counts),
             Self::Vcm(vcm) => vcm.pass(scene, film, pass, counts),

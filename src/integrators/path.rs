@@ -1,13 +1,13 @@
-//! Path tracing from the camera with next event estimation, both weighted by the power heuristic (Veach 1997, sections
-//! 9.2 and 10.3). One path per pixel and pass.
+//! Path tracing from the camera with next event estimation, both weighted by the power or the balance heuristic (Veach
+//! 1997, sections 9.2 and 10.3). One path per pixel and pass.
 
 use super::{Counts, render::Settings};
 use crate::bsdf::Scatter;
 use crate::emitter::Start;
 use crate::film::{Band, Film, Kernel, Word};
 use crate::math::{Row, SolidAnglePdf, Stream, Walk};
-use crate::paths::{direct_pdf, sample_direct};
-use crate::scene::{Caster, Origin, Scene, Surface};
+use crate::paths::{Heuristic, direct_pdf, sample_direct};
+use crate::scene::{Caster, EmitterId, LightChoice, Origin, Scene, Surface};
 use crate::spectrum::Spectrum;
 use glam::{DVec2, DVec3};
 
@@ -18,11 +18,14 @@ const ROULETTE_FROM: usize = 5;
 pub(super) struct Path {
     seed: u64,
     max_depth: usize,
+    heuristic: Heuristic,
+    lights: LightChoice,
 }
 
 impl Path {
     pub(super) fn start(settings: &Settings) -> Self {
-        Self { seed: settings.seed, max_depth: settings.max_depth }
+        let Settings { seed, max_depth, heuristic, lights, .. } = *settings;
+        Self { seed, max_depth, heuristic, lights }
     }
 
     /// The light of paths with at most `max_depth` edges.
@@ -34,15 +37,29 @@ impl Path {
         let kernel = film.kernel.clone();
         let size = film.size;
         let rays = film.for_each_band(|index, band| {
-            let caster = Caster::new(scene);
-            let mut stream = Stream::new(self.seed, &[pass, index as u64]);
+            let mut job = Job {
+                scene: Caster::choosing(scene, self.lights),
+                kernel: &kernel,
+                size,
+                heuristic: self.heuristic,
+                stream: Stream::new(self.seed, &[pass, index as u64]),
+            };
             for pixel in band.pixels() {
-                trace(&caster, &kernel, size, pixel, self.max_depth, &mut stream, band);
+                job.trace(pixel, self.max_depth, band);
             }
-            caster.rays()
+            job.scene.rays()
         });
         counts.add((size[0] * size[1]) as u64, rays.iter().sum());
     }
+}
+
+/// What walks from the camera need that keep no vertices.
+pub(super) struct Job<'a> {
+    pub scene: Caster<'a>,
+    pub kernel: &'a Kernel,
+    pub size: [usize; 2],
+    pub heuristic: Heuristic,
+    pub stream: Stream,
 }
 
 /// Film position for a pixel, from the first two numbers of a row.
@@ -62,13 +79,6 @@ pub(super) struct State {
 }
 
 impl State {
-    /// The walk through the film position `film`; the lens is sampled by `row`.
-    #[inline]
-    pub(super) fn at_camera(scene: &Scene, film: DVec2, row: Row) -> Self {
-        let (origin, direction) = scene.camera.ray(film, row);
-        Self { origin: origin.into(), direction, throughput: Spectrum::ONE, word: Word::EMPTY, pdf: None }
-    }
-
     /// What the walk meets next.
     #[inline]
     pub(super) fn next(&self, scene: &Caster<'_>) -> Option<Surface> {
@@ -93,102 +103,105 @@ impl State {
     }
 }
 
-#[inline]
-fn trace(
-    scene: &Caster<'_>,
-    kernel: &Kernel,
-    size: [usize; 2],
-    pixel: [usize; 2],
-    max_depth: usize,
-    stream: &mut Stream,
-    band: &mut Band,
-) {
-    let row = stream.row();
-    let mut state = State::at_camera(scene, film_position(kernel, size, pixel, row), row);
-    let mut alive = 1.0;
-    for depth in 1..=max_depth {
-        let Some(surface) = state.next(scene) else {
-            background(scene, &state, pixel, band);
-            return;
-        };
-        emission(scene, &surface, &state, pixel, band);
-        if depth == max_depth {
-            return;
-        }
-        let wi = surface.frame.to_local(-state.direction);
-        let bsdf = scene.bsdf(surface.bsdf);
-        if !bsdf.is_delta(scene.met(&surface, wi)) {
-            direct(scene, &surface, wi, &state, true, stream, pixel, band);
-        }
-        let row = stream.row();
-        let Some(scatter) = scene.scatter(&surface, wi, row, Walk::FromCamera) else { return };
-        let mut weight = scatter.weight;
-        alive *= weight.max_element() * scatter.eta * scatter.eta;
-        if depth >= ROULETTE_FROM {
-            let survival = f64::min(alive, 0.95);
-            if row[3] >= survival {
+impl Job<'_> {
+    /// A walk through `pixel`.
+    #[inline]
+    pub(super) fn at_camera(&mut self, pixel: [usize; 2]) -> State {
+        let row: Row = self.stream.row();
+        let (origin, direction) = self.scene.camera.ray(film_position(self.kernel, self.size, pixel, row), row);
+        State { origin: origin.into(), direction, throughput: Spectrum::ONE, word: Word::EMPTY, pdf: None }
+    }
+
+    #[inline]
+    fn trace(&mut self, pixel: [usize; 2], max_depth: usize, band: &mut Band) {
+        let mut state = self.at_camera(pixel);
+        let mut alive = 1.0;
+        for depth in 1..=max_depth {
+            let Some(surface) = state.next(&self.scene) else {
+                self.background(&state, pixel, band);
+                return;
+            };
+            self.emission(&surface, &state, pixel, band);
+            if depth == max_depth {
                 return;
             }
-            weight = weight / survival;
-            alive /= survival;
+            let wi = surface.frame.to_local(-state.direction);
+            if !self.scene.bsdf(surface.bsdf).is_delta(self.scene.met(&surface, wi)) {
+                self.direct(&surface, wi, &state, true, pixel, band);
+            }
+            let row = self.stream.row();
+            let Some(scatter) = self.scene.scatter(&surface, wi, row, Walk::FromCamera) else { return };
+            let mut weight = scatter.weight;
+            alive *= weight.max_element() * scatter.eta * scatter.eta;
+            if depth >= ROULETTE_FROM {
+                let survival = f64::min(alive, 0.95);
+                if row[3] >= survival {
+                    return;
+                }
+                weight = weight / survival;
+                alive /= survival;
+            }
+            state = state.scattered(&surface, &scatter, weight);
         }
-        state = state.scattered(&surface, &scatter, weight);
     }
-}
 
-/// Light from the environment, where the walk has left the scene.
-#[inline]
-pub(super) fn background(scene: &Caster<'_>, state: &State, pixel: [usize; 2], band: &mut Band) {
-    let Some(id) = scene.environment().filter(|_| !scene.hide_emitters || state.word != Word::EMPTY) else { return };
-    let start = Start::Infinite { towards: state.direction };
-    let radiance = scene.emitter(id).radiance(&start, -state.direction);
-    let weight = state.pdf.map_or(1.0, |pdf| power(pdf, direct_pdf(scene, id, &start, state.direction, 1.0)));
-    band.add(pixel, state.word.class(), state.throughput * radiance * weight);
-}
-
-/// Light that the walk has met.
-#[inline]
-pub(super) fn emission(scene: &Caster<'_>, surface: &Surface, state: &State, pixel: [usize; 2], band: &mut Band) {
-    let Some(id) = surface.emitter else { return };
-    let start = Start::Surface { position: surface.position, normal: surface.geometric, uv: surface.spot.uv };
-    let radiance = scene.emitter(id).radiance(&start, -state.direction);
-    if radiance.is_black() {
-        return;
+    /// Light from the environment, where the walk has left the scene.
+    #[inline]
+    pub(super) fn background(&self, state: &State, pixel: [usize; 2], band: &mut Band) {
+        let scene = &self.scene;
+        let hidden = scene.hide_emitters && state.word == Word::EMPTY;
+        let Some(id) = scene.environment().filter(|_| !hidden) else { return };
+        let start = Start::Infinite { towards: state.direction };
+        let radiance = scene.emitter(id).radiance(&start, -state.direction);
+        band.add(pixel, state.word.class(), state.throughput * radiance * self.weight_of_hit(state, id, &start));
     }
-    let weight = state.pdf.map_or(1.0, |pdf| {
-        let distance = surface.position.distance(state.origin.point);
-        power(pdf, direct_pdf(scene, id, &start, state.direction, distance))
-    });
-    band.add(pixel, state.word.class(), state.throughput * radiance * weight);
-}
 
-/// Light that reaches the surface directly; `goes_on` says whether the walk could meet the same light later.
-#[inline]
-#[allow(clippy::too_many_arguments)]
-pub(super) fn direct(
-    scene: &Caster<'_>,
-    surface: &Surface,
-    wi: DVec3,
-    state: &State,
-    goes_on: bool,
-    stream: &mut Stream,
-    pixel: [usize; 2],
-    band: &mut Band,
-) {
-    let Some(light) = sample_direct(scene, surface.position, stream.row()) else { return };
-    let wo = surface.frame.to_local(light.direction);
-    let Some(scattered) = scene.evaluate(surface, wi, wo, Walk::FromCamera) else { return };
-    if !light.arrives(scene, surface.leave(light.direction)) {
-        return;
+    /// Light that the walk has met.
+    #[inline]
+    pub(super) fn emission(&self, surface: &Surface, state: &State, pixel: [usize; 2], band: &mut Band) {
+        let Some(id) = surface.emitter else { return };
+        let start = Start::Surface { position: surface.position, normal: surface.geometric, uv: surface.spot.uv };
+        let radiance = self.scene.emitter(id).radiance(&start, -state.direction);
+        if radiance.is_black() {
+            return;
+        }
+        band.add(pixel, state.word.class(), state.throughput * radiance * self.weight_of_hit(state, id, &start));
     }
-    let weight = light.pdf.filter(|_| goes_on).map_or(1.0, |pdf| power(pdf, scattered.pdf));
-    let value = state.throughput * scattered.value * light.radiance * (wo.z.abs() * weight);
-    band.add(pixel, state.word.preceded_by(scattered.letter).class(), value);
-}
 
-/// Power heuristic for a sample of density `own`, which another technique would have made with density `other`.
-#[inline]
-fn power(SolidAnglePdf(own): SolidAnglePdf, SolidAnglePdf(other): SolidAnglePdf) -> f64 {
-    let ratio = other / own;
-    1.0 / (1.0 + ratio * ratio)
+    /// Weight of light that a walk has met at `start`.
+    #[inline]
+    fn weight_of_hit(&self, state: &State, id: EmitterId, start: &Start) -> f64 {
+        state.pdf.map_or(1.0, |pdf| {
+            self.weight(pdf, direct_pdf(&self.scene, state.origin.point, id, start, state.direction))
+        })
+    }
+
+    /// Light that reaches the surface directly; `goes_on` says whether the walk could meet the same light later.
+    #[inline]
+    pub(super) fn direct(
+        &mut self,
+        surface: &Surface,
+        wi: DVec3,
+        state: &State,
+        goes_on: bool,
+        pixel: [usize; 2],
+        band: &mut Band,
+    ) {
+        let scene = &self.scene;
+        let Some(light) = sample_direct(scene, surface.position, self.stream.row()) else { return };
+        let wo = surface.frame.to_local(light.direction);
+        let Some(scattered) = scene.evaluate(surface, wi, wo, Walk::FromCamera) else { return };
+        if !light.arrives(scene, surface.leave(light.direction)) {
+            return;
+        }
+        let weight = light.pdf.filter(|_| goes_on).map_or(1.0, |pdf| self.weight(pdf, scattered.pdf));
+        let value = state.throughput * scattered.value * light.radiance * (wo.z.abs() * weight);
+        band.add(pixel, state.word.preceded_by(scattered.letter).class(), value);
+    }
+
+    /// Weight of a sample of density `own`, which another technique would have made with density `other`.
+    #[inline]
+    fn weight(&self, SolidAnglePdf(own): SolidAnglePdf, SolidAnglePdf(other): SolidAnglePdf) -> f64 {
+        1.0 / (1.0 + self.heuristic.apply(other / own))
+    }
 }

@@ -7,8 +7,11 @@ use std::ops::Range;
 /// value.
 const ALPHA: f64 = 2.0 / 3.0;
 
-/// First radius in units of the size that a pixel has where photons are looked for.
+/// First radius in units of the size that a pixel has where photons are looked for, by default.
 pub(super) const FIRST_RADIUS: f64 = 2.5;
+
+/// Most light subpaths of a pass by default.
+pub const MOST_PHOTONS: usize = 1 << 20;
 
 /// Photons whose distance from the tangent plane exceeds this share of the radius lie on another surface.
 const FLATNESS: f64 = 0.3;

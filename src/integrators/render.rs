@@ -1,9 +1,11 @@
 //! The render loop: passes until the budget is spent, then the image with what is known of how it was made.
 
+use super::photons::FIRST_RADIUS;
 use super::{Counts, Integrator, Method};
 use crate::film::{Film, Health, PathClass};
 use crate::image::{DEPTH_KEY, INTEGRATOR_KEY, Image, SCENE_KEY};
-use crate::scene::Scene;
+use crate::paths::Heuristic;
+use crate::scene::{LightChoice, Scene};
 use cpu_time::ProcessTime;
 use serde_json::{Map, Value, json};
 use std::time::{Duration, Instant};
@@ -19,6 +21,33 @@ pub struct Settings {
     pub features: bool,
     /// When to stop.
     pub budget: Budget,
+    /// How the densities of techniques make weights; in mmlt always by the power heuristic.
+    pub heuristic: Heuristic,
+    /// How lights are chosen for direct light; by power in mmlt, whose primary samples do not know the point.
+    pub lights: LightChoice,
+    /// Light subpaths per pass of sppm and vcm; where not given one per pixel, up to [`super::MOST_PHOTONS`].
+    pub photons: Option<usize>,
+    /// First radius of sppm and vcm, in units of the size that a pixel has where photons are looked for.
+    pub radius: f64,
+    /// Whether sppm estimates direct light by sampling lights; else by photons too.
+    pub sample_direct: bool,
+}
+
+impl Default for Settings {
+    /// One pass with seed 0 of paths up to 6 edges, with features.
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            max_depth: 6,
+            features: true,
+            budget: Budget::Passes(1),
+            heuristic: Heuristic::Power,
+            lights: LightChoice::default(),
+            photons: None,
+            radius: FIRST_RADIUS,
+            sample_direct: true,
+        }
+    }
 }
 
 /// When to stop.

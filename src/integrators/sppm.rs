@@ -3,18 +3,18 @@
 //! the image is the mean over passes.
 //!
 //! A pass walks from the camera to the first diffuse-like vertex of each pixel. Light met on the way and direct light
-//! are estimated as in path tracing. All other light is gathered from photons that met at least one surface before:
-//! with N photons of power Φ and radius r, L = 1 / (N π r²) Σ f Φ. The class of a photon's path is the photon's word,
+//! are estimated as in path tracing (direct light where photons are gathered by these, if the settings say so). All other
+//! light is gathered from photons that met at least one surface before: with N photons of power Φ and radius r, L = 1 / (N π r²) Σ f Φ. The class of a photon's path is the photon's word,
 //! the letter of the gathering vertex for the two directions, and the word of the camera's walk.
 
 use super::grid::{Grids, Located};
-use super::path::{self, State, film_position};
-use super::photons::{FIRST_RADIUS, JOBS, is_beside, job_range, shrinkage};
+use super::path::Job;
+use super::photons::{JOBS, MOST_PHOTONS, is_beside, job_range, shrinkage};
 use super::{Counts, render::Settings};
-use crate::film::{Band, Film, Kernel, Word};
+use crate::film::{Band, Film, Word};
 use crate::math::{Stream, Walk};
-use crate::paths::{Random, Subpath, VertexKind, trace_light};
-use crate::scene::{Caster, Scene, Surface};
+use crate::paths::{Heuristic, Random, Subpath, VertexKind, trace_light};
+use crate::scene::{Caster, LightChoice, Scene, Surface};
 use crate::spectrum::Spectrum;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -27,7 +27,12 @@ const ROULETTE_FROM: usize = 3;
 pub(super) struct Sppm {
     seed: u64,
     max_depth: usize,
+    heuristic: Heuristic,
+    lights: LightChoice,
+    sample_direct: bool,
     photons: usize,
+    /// First radius in pixels.
+    radius: f64,
     /// Square of the radius relative to the first one.
     shrinkage: f64,
 }
@@ -65,26 +70,28 @@ impl Located for Photon {
 
 impl Sppm {
     pub(super) fn start(scene: &Scene, settings: &Settings) -> Self {
-        Self {
-            seed: settings.seed,
-            max_depth: settings.max_depth,
-            photons: scene.camera.size.iter().product(),
-            shrinkage: 1.0,
-        }
+        let Settings { seed, max_depth, heuristic, lights, sample_direct, radius, .. } = *settings;
+        let pixels: usize = scene.camera.size.iter().product();
+        let photons = settings.photons.unwrap_or(pixels.min(MOST_PHOTONS)).max(1);
+        Self { seed, max_depth, heuristic, lights, sample_direct, photons, radius, shrinkage: 1.0 }
     }
 
     pub(super) fn pass(&mut self, scene: &Scene, film: &mut Film, pass: u64, counts: &mut Counts) {
         let kernel = film.kernel.clone();
         let size = film.size;
-        let radius = FIRST_RADIUS * self.shrinkage.sqrt();
         let walks = film.for_each_band(|index, band| {
-            let caster = Caster::new(scene);
-            let mut stream = Stream::new(self.seed, &[0, pass, index as u64]);
+            let mut job = Job {
+                scene: Caster::choosing(scene, self.lights),
+                kernel: &kernel,
+                size,
+                heuristic: self.heuristic,
+                stream: Stream::new(self.seed, &[0, pass, index as u64]),
+            };
             let mut gathers = Vec::new();
             for pixel in band.pixels() {
-                self.walk(&caster, &kernel, size, pixel, radius, &mut stream, band, &mut gathers);
+                self.walk(&mut job, pixel, band, &mut gathers);
             }
-            (gathers, caster.rays())
+            (gathers, job.scene.rays())
         });
         let shot: Vec<(Vec<Photon>, u64)> =
             (0..JOBS).into_par_iter().map(|job| self.shoot(scene, pass, job as u64)).collect();
@@ -102,37 +109,25 @@ impl Sppm {
 
     /// Walks from the camera to the first diffuse-like vertex, adding light met on the way and direct light. What such a
     /// vertex scatters by delta lobes is not gathered there: by these the walk goes on.
-    #[allow(clippy::too_many_arguments)]
-    fn walk(
-        &self,
-        scene: &Caster<'_>,
-        kernel: &Kernel,
-        size: [usize; 2],
-        pixel: [usize; 2],
-        radius_in_pixels: f64,
-        stream: &mut Stream,
-        band: &mut Band,
-        gathers: &mut Vec<Gather>,
-    ) {
-        let row = stream.row();
-        let mut state = State::at_camera(scene, film_position(kernel, size, pixel, row), row);
+    fn walk(&self, job: &mut Job<'_>, pixel: [usize; 2], band: &mut Band, gathers: &mut Vec<Gather>) {
+        let mut state = job.at_camera(pixel);
         let mut distance = 0.0;
         for edges in 1..=self.max_depth {
-            let Some(surface) = state.next(scene) else {
-                path::background(scene, &state, pixel, band);
+            let Some(surface) = state.next(&job.scene) else {
+                job.background(&state, pixel, band);
                 return;
             };
             distance += surface.position.distance(state.origin.point);
-            path::emission(scene, &surface, &state, pixel, band);
+            job.emission(&surface, &state, pixel, band);
             if edges == self.max_depth {
                 return;
             }
             let wi = surface.frame.to_local(-state.direction);
-            let bsdf = scene.bsdf(surface.bsdf);
-            let met = scene.met(&surface, wi);
-            let gathered = bsdf.gathers(met);
-            if !bsdf.is_delta(met) {
-                path::direct(scene, &surface, wi, &state, !gathered, stream, pixel, band);
+            let bsdf = job.scene.bsdf(surface.bsdf);
+            let met = job.scene.met(&surface, wi);
+            let (gathered, is_delta, has_delta) = (bsdf.gathers(met), bsdf.is_delta(met), bsdf.has_delta(met));
+            if !is_delta && (self.sample_direct || !gathered) {
+                job.direct(&surface, wi, &state, !gathered, pixel, band);
             }
             if gathered {
                 gathers.push(Gather {
@@ -141,14 +136,15 @@ impl Sppm {
                     throughput: state.throughput,
                     word: state.word,
                     edges,
-                    radius: radius_in_pixels * scene.camera.pixel_width(distance),
+                    radius: self.radius * self.shrinkage.sqrt() * job.scene.camera.pixel_width(distance),
                     pixel,
                 });
-                if !bsdf.has_delta(met) {
+                if !has_delta {
                     return;
                 }
             }
-            let Some(scatter) = scene.scatter(&surface, wi, stream.row(), Walk::FromCamera) else { return };
+            let row = job.stream.row();
+            let Some(scatter) = job.scene.scatter(&surface, wi, row, Walk::FromCamera) else { return };
             if gathered && !scatter.delta {
                 return;
             }
@@ -164,8 +160,9 @@ impl Sppm {
         let mut photons = Vec::new();
         for _ in job_range(self.photons, job as usize) {
             trace_light(&caster, &mut Random(&mut stream), self.max_depth, ROULETTE_FROM, &mut path);
-            // The first surface receives direct light, which the walks from the camera account for.
-            for (edges, vertex) in path.vertices.iter().enumerate().skip(2) {
+            // The first surface receives direct light, which the walks from the camera may account for.
+            let first = if self.sample_direct { 2 } else { 1 };
+            for (edges, vertex) in path.vertices.iter().enumerate().skip(first) {
                 let VertexKind::Surface(surface) = &vertex.kind else { continue };
                 let met = scene.met(surface, surface.frame.to_local(vertex.back));
                 if scene.bsdf(surface.bsdf).gathers(met) {

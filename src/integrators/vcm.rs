@@ -10,17 +10,17 @@
 use super::bdpt::{ROULETTE_FROM, connect_all};
 use super::grid::{Grid, Located};
 use super::path::film_position;
-use super::photons::{FIRST_RADIUS, JOBS, is_beside, job_range, shrinkage};
+use super::photons::{JOBS, is_beside, job_range, shrinkage};
 use super::{Counts, render::Settings};
 use crate::film::{Film, Kernel, Splats};
 use crate::math::{Row, Stream};
 use crate::paths::{Heuristic, Random, Subpath, Techniques, Vertex, connect, merge, trace_camera, trace_light};
-use crate::scene::{Caster, Scene};
+use crate::scene::{Caster, LightChoice, Scene};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
-/// Most light subpaths of a pass: their vertices take some 300 bytes each.
+/// Most light subpaths of a pass by default: their vertices take some 350 bytes each.
 const MOST_PATHS: usize = 1 << 17;
 
 /// Pixels along an axis that are probed for the first radius.
@@ -30,6 +30,8 @@ const PROBES: usize = 64;
 pub(super) struct Vcm {
     seed: u64,
     max_depth: usize,
+    heuristic: Heuristic,
+    lights: LightChoice,
     /// Light subpaths per pass.
     paths: usize,
     /// Radius of the next pass; 0 where nothing can be merged.
@@ -72,20 +74,22 @@ impl Located for Photon {
 impl Vcm {
     pub(super) fn start(scene: &Scene, settings: &Settings) -> Self {
         let pixels: usize = scene.camera.size.iter().product();
-        let radius = FIRST_RADIUS * usual_footprint(scene, settings);
-        Self { seed: settings.seed, max_depth: settings.max_depth, paths: pixels.clamp(1, MOST_PATHS), radius }
+        let Settings { seed, max_depth, heuristic, lights, .. } = *settings;
+        let radius = settings.radius * usual_footprint(scene, settings);
+        let paths = settings.photons.unwrap_or(pixels.min(MOST_PATHS)).max(1);
+        Self { seed, max_depth, heuristic, lights, paths, radius }
     }
 
     pub(super) fn pass(&mut self, scene: &Scene, film: &mut Film, pass: u64, counts: &mut Counts) {
         let (kernel, size) = (film.kernel.clone(), film.size);
         let pixels = size[0] * size[1];
-        let techniques =
-            Techniques { heuristic: Heuristic::Power, merging: self.paths as f64 * PI * self.radius * self.radius };
+        let merging = self.paths as f64 * PI * self.radius * self.radius;
+        let techniques = Techniques { heuristic: Some(self.heuristic), merging };
         let bundles: Vec<Bundle> =
             (0..JOBS).into_par_iter().map(|job| self.shoot(scene, &kernel, size, &techniques, pass, job)).collect();
         let grid = (self.radius > 0.0).then(|| Grid::new(&photons(&bundles), 2.0 * self.radius));
         let rays = film.for_each_band(|index, band| {
-            let caster = Caster::new(scene);
+            let caster = Caster::choosing(scene, self.lights);
             let mut stream = Stream::new(self.seed, &[0, pass, index as u64]);
             let mut camera = Subpath::default();
             for pixel in band.pixels() {
@@ -131,7 +135,7 @@ impl Vcm {
         pass: u64,
         job: usize,
     ) -> Bundle {
-        let caster = Caster::new(scene);
+        let caster = Caster::choosing(scene, self.lights);
         let mut stream = Stream::new(self.seed, &[1, pass, job as u64]);
         let mut light = Subpath::default();
         let mut lens = Subpath::default();

@@ -58,6 +58,7 @@ fn see_light(scene: &Caster<'_>, camera: &[Vertex], techniques: &Techniques) -> 
     let junction = Junction {
         camera: scene.start_pdf(id, &start).0,
         camera_previous: emitted_pdf(emitter, &start, previous, end.back, previous.position - end.position).0,
+        preference: scene.preference(id, previous.position),
         ..Junction::default()
     };
     let weight =
@@ -181,6 +182,7 @@ fn join(
         light_previous: light_end.previous,
         camera: arrival(scene, &light_end.onward, end, -to_light, distance_squared),
         camera_previous: camera_end.previous,
+        preference: light[0].preference,
     };
     let weight = mis::weight(light, camera, &junction, Joint::Connected, techniques);
     Some(Connection { value: value * weight, class: light_end.word.join(camera_end.word), film: None })
@@ -215,6 +217,7 @@ fn reach_camera(
     let junction = Junction {
         light: density * normal.dot(direction).abs(),
         light_previous: light_end.previous,
+        preference: light[0].preference,
         ..Junction::default()
     };
     let weight = mis::weight(light, camera, &junction, Joint::Connected, techniques);

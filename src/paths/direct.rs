@@ -2,7 +2,7 @@
 
 use super::trace::light_offset;
 use crate::emitter::Start;
-use crate::math::{Row, SolidAnglePdf};
+use crate::math::{AreaPdf, Row, SolidAnglePdf};
 use crate::scene::{Caster, EmitterId, Origin};
 use crate::spectrum::Spectrum;
 use glam::DVec3;
@@ -34,7 +34,7 @@ impl Direct {
 /// Samples light that may arrive at `position`.
 #[inline]
 pub fn sample_direct(scene: &Caster<'_>, position: DVec3, row: Row) -> Option<Direct> {
-    let (id, start, pdf) = scene.sample_start(row)?;
+    let (id, start, pdf, _) = scene.sample_start_for(position, row)?;
     let emitter = scene.emitter(id);
     let (direction, target, pdf, weight) = match start {
         Start::Infinite { towards } => (towards, None, Some(SolidAnglePdf(pdf.0)), 1.0 / pdf.0),
@@ -55,13 +55,15 @@ pub fn sample_direct(scene: &Caster<'_>, position: DVec3, row: Row) -> Option<Di
     (!radiance.is_black()).then_some(Direct { direction, radiance, pdf, target })
 }
 
-/// Density with which [`sample_direct`] finds `start` of the emitter `id`, which a walk has hit along `direction` after
-/// `distance`; for an environment the distance does not matter.
+/// Density with which [`sample_direct`] finds, for a point at `from`, the `start` of the emitter `id` that a walk has hit
+/// from there along `direction`.
 #[inline]
-pub fn direct_pdf(scene: &Caster<'_>, id: EmitterId, start: &Start, direction: DVec3, distance: f64) -> SolidAnglePdf {
-    let pdf = scene.start_pdf(id, start);
+pub fn direct_pdf(scene: &Caster<'_>, from: DVec3, id: EmitterId, start: &Start, direction: DVec3) -> SolidAnglePdf {
+    let pdf = AreaPdf(scene.start_pdf(id, start).0 * scene.preference(id, from));
     match start {
-        Start::Surface { normal, .. } => pdf.to_solid_angle(normal.dot(direction), distance * distance),
+        Start::Surface { position, normal, .. } => {
+            pdf.to_solid_angle(normal.dot(direction), position.distance_squared(from))
+        }
         Start::Infinite { .. } | Start::Point { .. } | Start::Distant { .. } => SolidAnglePdf(pdf.0),
     }
 }

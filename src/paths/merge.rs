@@ -26,9 +26,11 @@ pub fn merge(scene: &Caster<'_>, light: &[Vertex], camera: &[Vertex], techniques
         light_previous: reverse_pdf(from, photon, scattered.pdf).0,
         camera: reverse_pdf(towards, end, scattered.pdf_reverse).0,
         camera_previous: before.len().checked_sub(2).map_or(0.0, |i| before[i].reverse.0),
+        preference: light[0].preference,
     };
     let share = mis::weight(light, before, &junction, Joint::Merged, techniques);
-    let weight = share * techniques.heuristic.apply(techniques.merging * end.forward.0);
+    let density = techniques.merging * end.forward.0;
+    let weight = share * techniques.heuristic.map_or(1.0, |heuristic| heuristic.apply(density));
     let value = photon.throughput * scattered.value * end.throughput * (wo.z.abs() / geometric * weight);
     let class = photon.word.then(scattered.letter).join(end.word);
     Some(Connection { value: value / techniques.merging, class, film: None })

@@ -5,6 +5,9 @@
 //! A vertex with delta lobes only cannot be an end of a connection, so techniques that would connect there have no
 //! density; the coefficients of its Dirac densities stand in for the densities and cancel.
 //!
+//! Direct light, technique s = 1, may choose its light by where it is to arrive; walks cannot. Its density is that of the
+//! choice by power times the preference q(x_1) / p of the light.
+//!
 //! Merging (Georgiev et al. 2012, *Light Transport Simulation with Vertex Connection and Merging*) joins a light subpath
 //! that ends near x_i with a camera subpath that ends at x_i. Both have sampled x_i, and any of N light subpaths may end
 //! within the radius r, so its density is that of the connection with i + 1 light vertices times η C_i, η = N π r².
@@ -14,7 +17,7 @@ use crate::emitter::Start;
 
 /// The densities that a connection changes: those of its two end vertices and their predecessors, in a walk from the
 /// other side.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Junction {
     /// C of the last vertex of the light subpath.
     pub light: f64,
@@ -24,10 +27,19 @@ pub(super) struct Junction {
     pub camera: f64,
     /// L of the vertex before it.
     pub camera_previous: f64,
+    /// How much more often direct light chooses the path's light for its first surface than walks do.
+    pub preference: f64,
+}
+
+impl Default for Junction {
+    fn default() -> Self {
+        Self { light: 0.0, light_previous: 0.0, camera: 0.0, camera_previous: 0.0, preference: 1.0 }
+    }
 }
 
 /// Exponent of the power heuristic.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
 pub enum Heuristic {
     /// Weights proportional to the densities.
     Balance,
@@ -36,8 +48,9 @@ pub enum Heuristic {
 }
 
 impl Heuristic {
+    /// What a technique counts whose density is `ratio` times that of another, if the other counts 1.
     #[inline]
-    pub(super) fn apply(self, ratio: f64) -> f64 {
+    pub fn apply(self, ratio: f64) -> f64 {
         match self {
             Self::Balance => ratio,
             Self::Power => ratio * ratio,
@@ -48,8 +61,8 @@ impl Heuristic {
 /// The techniques that a method combines, and how.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Techniques {
-    /// How their densities make weights.
-    pub heuristic: Heuristic,
+    /// How their densities make weights; `None` where each path has one technique only, of weight 1.
+    pub heuristic: Option<Heuristic>,
     /// Light subpaths that may be merged with a camera subpath, times the area that they are merged over; 0 for methods
     /// that only connect.
     pub merging: f64,
@@ -57,7 +70,12 @@ pub struct Techniques {
 
 impl Techniques {
     /// Connections only.
-    pub const CONNECTIONS: Self = Self { heuristic: Heuristic::Power, merging: 0.0 };
+    pub const fn connections(heuristic: Heuristic) -> Self {
+        Self { heuristic: Some(heuristic), merging: 0.0 }
+    }
+
+    /// One technique for each path.
+    pub const ALONE: Self = Self { heuristic: None, merging: 0.0 };
 }
 
 /// How the two subpaths come together.
@@ -79,10 +97,13 @@ pub(super) fn weight(
     joint: Joint,
     techniques: &Techniques,
 ) -> f64 {
-    let Techniques { heuristic, merging } = *techniques;
+    let Techniques { heuristic: Some(heuristic), merging } = *techniques else { return 1.0 };
     let merged = joint == Joint::Merged;
+    // What the technique with this many light vertices has beside the densities of walks.
+    let preferred = |lights: usize| if lights == 1 { junction.preference } else { 1.0 };
+    let own = heuristic.apply(preferred(light.len()));
     // After a merger the last camera vertex has scattered, perhaps in a way that no connection can.
-    let mut sum = if merged && camera[camera.len() - 1].delta { 0.0 } else { 1.0 };
+    let mut sum = if merged && camera[camera.len() - 1].delta { 0.0 } else { own };
 
     // Techniques with more vertices from the camera: x_{s-1}, x_{s-2}, … change sides.
     let mut ratio = 1.0;
@@ -100,7 +121,7 @@ pub(super) fn weight(
         ratio *= from_camera / light[i].forward.0;
         let possible = if i == 0 { can_be_hit(&light[0]) } else { !scatters_delta && !light[i - 1].delta };
         if possible {
-            sum += heuristic.apply(ratio);
+            sum += heuristic.apply(ratio * preferred(i));
         }
     }
 
@@ -120,10 +141,10 @@ pub(super) fn weight(
         }
         ratio *= from_light / camera[i].forward.0;
         if !scatters_delta && !camera[i - 1].delta {
-            sum += heuristic.apply(ratio);
+            sum += heuristic.apply(ratio * preferred(light.len() + camera.len() - i));
         }
     }
-    1.0 / sum
+    own / sum
 }
 
 /// Whether a walk from the camera can meet the light that `vertex` lies on.

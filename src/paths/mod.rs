@@ -18,4 +18,4 @@ pub use merge::merge;
 pub use mis::{Heuristic, Techniques};
 pub use rows::{Random, Rows};
 pub use subpath::{Subpath, Vertex, VertexKind};
-pub use trace::{light_vertex, shading_correction, trace_camera, trace_light};
+pub use trace::{light_vertex, light_vertex_for, shading_correction, trace_camera, trace_light};

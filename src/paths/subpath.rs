@@ -42,6 +42,9 @@ pub struct Vertex {
     pub delta: bool,
     /// Letters of the vertices before this one.
     pub word: Word,
+    /// For the first vertex of a walk from a light, once the second is known: how much more often its light is chosen
+    /// for direct light there than for walks ([`crate::scene::Caster::preference`]). 1 for all others.
+    pub preference: f64,
 }
 
 impl Vertex {

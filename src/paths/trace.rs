@@ -34,6 +34,7 @@ pub fn trace_camera(
         connects: true,
         delta: false,
         word: Word::EMPTY,
+        preference: 1.0,
     });
     // As for a light, the density of the first surface is known to where the walk starts.
     let pdf = SolidAnglePdf(0.0);
@@ -71,15 +72,30 @@ pub fn trace_light(
     walk(scene, walker, Walk::FromLight, rows, vertices, roulette_from, path);
 }
 
-/// The first vertex of a walk from a light, or the only one of a light subpath for direct light.
+/// The only vertex of a light subpath for direct light at `point`.
+#[inline]
+pub fn light_vertex_for(scene: &Caster<'_>, point: DVec3, row: Row) -> Option<Vertex> {
+    let (id, start, pdf, preference) = scene.sample_start_for(point, row)?;
+    let vertex = on_light(id, start, pdf);
+    // Densities are those of walks: weights account for the choice.
+    Some(Vertex { forward: AreaPdf(pdf.0 / preference), preference, ..vertex })
+}
+
+/// The first vertex of a walk from a light.
 #[inline]
 pub fn light_vertex(scene: &Caster<'_>, row: Row) -> Option<Vertex> {
     let (id, start, pdf) = scene.sample_start(row)?;
+    Some(on_light(id, start, pdf))
+}
+
+/// The vertex where light starts, found with density `pdf`.
+#[inline]
+fn on_light(id: EmitterId, start: Start, pdf: AreaPdf) -> Vertex {
     let position = match start {
         Start::Surface { position, .. } | Start::Point { position } => position,
         Start::Infinite { .. } | Start::Distant { .. } => DVec3::ZERO,
     };
-    Some(Vertex {
+    Vertex {
         kind: VertexKind::Light(id, start),
         position,
         back: DVec3::ZERO,
@@ -89,7 +105,8 @@ pub fn light_vertex(scene: &Caster<'_>, row: Row) -> Option<Vertex> {
         connects: true,
         delta: false,
         word: Word::EMPTY,
-    })
+        preference: 1.0,
+    }
 }
 
 /// Distance by which rays are started off a light at `position`.
@@ -135,6 +152,9 @@ fn walk(
             return;
         };
         let vertex = surface_vertex(scene, &surface, &walker, &path.vertices[last]);
+        if let VertexKind::Light(id, _) = path.vertices[last].kind {
+            path.vertices[last].preference = scene.preference(id, vertex.position);
+        }
         path.vertices.push(vertex);
         if path.vertices.len() == vertices {
             return;
@@ -184,6 +204,7 @@ fn environment_vertex(id: EmitterId, walker: &Walker) -> Vertex {
         connects: true,
         delta: false,
         word: walker.word,
+        preference: 1.0,
     }
 }
 
@@ -207,6 +228,7 @@ fn surface_vertex(scene: &Caster<'_>, surface: &Surface, walker: &Walker, previo
         connects: !scene.bsdf(surface.bsdf).is_delta(met),
         delta: false,
         word: walker.word,
+        preference: 1.0,
     }
 }
 

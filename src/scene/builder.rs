@@ -3,7 +3,9 @@
 use super::{BsdfId, EmitterId, Scene, Shape};
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
-use crate::emitter::{Area, Backdrop, Constant, Directional, Emitter, Environment, Point, Reach, Spot, Surface};
+use crate::emitter::{
+    Area, Backdrop, Constant, Directional, Emitter, Environment, LightTree, Point, Reach, Spot, Surface,
+};
 use crate::film::Filter;
 use crate::geometry::{Bvh, Solid, geometric_normal};
 use crate::math::Discrete;
@@ -294,6 +296,7 @@ impl Builder {
             bsdfs: self.bsdfs,
             reliefs: self.reliefs,
             lights: Discrete::new(&powers),
+            light_tree: LightTree::new(&self.emitters),
             emitters: self.emitters,
             environment,
             bvh,

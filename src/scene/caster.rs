@@ -1,7 +1,9 @@
-//! Casts rays and counts them.
+//! Casts rays and counts them; chooses lights.
 
-use super::{Scene, Surface};
+use super::{EmitterId, LightChoice, Scene, Surface};
+use crate::emitter::{LightTree, Start};
 use crate::geometry::{NO_TRIANGLE, Ray};
+use crate::math::{AreaPdf, Row};
 use glam::DVec3;
 use std::cell::Cell;
 use std::ops::Deref;
@@ -27,12 +29,43 @@ impl From<DVec3> for Origin {
 pub struct Caster<'a> {
     scene: &'a Scene,
     rays: Cell<u64>,
+    /// For the choice of lights by position.
+    tree: Option<&'a LightTree>,
 }
 
 impl<'a> Caster<'a> {
-    /// No rays cast yet.
+    /// No rays cast yet; lights are chosen by power.
     pub fn new(scene: &'a Scene) -> Self {
-        Self { scene, rays: Cell::new(0) }
+        Self::choosing(scene, LightChoice::Power)
+    }
+
+    /// No rays cast yet.
+    pub fn choosing(scene: &'a Scene, choice: LightChoice) -> Self {
+        let tree = match choice {
+            LightChoice::Power => None,
+            LightChoice::Position => scene.light_tree.as_ref(),
+        };
+        Self { scene, rays: Cell::new(0), tree }
+    }
+
+    /// Samples where light starts that may reach `point` directly. The density includes the choice of the emitter; the
+    /// last number is [`Caster::preference`].
+    #[inline]
+    pub fn sample_start_for(&self, point: DVec3, row: Row) -> Option<(EmitterId, Start, AreaPdf, f64)> {
+        let Some(tree) = self.tree else {
+            let (id, start, pdf) = self.scene.sample_start(row)?;
+            return Some((id, start, pdf, 1.0));
+        };
+        let (index, choice) = tree.sample(point, row[0])?;
+        let (start, pdf) = self.scene.emitters[index].start(row);
+        let id = EmitterId(index as u32);
+        Some((id, start, AreaPdf(pdf.0 * choice), choice / self.scene.choice_by_power(id)))
+    }
+
+    /// How much more often an emitter is chosen for direct light at `point` than by power.
+    #[inline]
+    pub fn preference(&self, id: EmitterId, point: DVec3) -> f64 {
+        self.tree.map_or(1.0, |tree| tree.probability(point, id.0 as usize) / self.scene.choice_by_power(id))
     }
 
     /// Rays cast so far.

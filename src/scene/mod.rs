@@ -12,7 +12,7 @@ pub use surface::Surface;
 
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
-use crate::emitter::{Emitter, Start};
+use crate::emitter::{Emitter, LightTree, Start};
 use crate::geometry::{Bvh, NO_TRIANGLE, Primitive, Ray, Solid, SurfacePoint, offset};
 use crate::math::{AreaPdf, Discrete, Frame, Row};
 use crate::texture::{Relief, Spot, attribute};
@@ -21,6 +21,17 @@ use glam::{DVec2, DVec3, Vec2, Vec3};
 /// Index into the scene's scattering models.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct BsdfId(pub u32);
+
+/// How walks from the camera choose a light for direct light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum LightChoice {
+    /// By emitted power.
+    Power,
+    /// By power, distance and direction, where there is more than one light to choose from by its place.
+    #[default]
+    Position,
+}
 
 /// Index into the scene's emitters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -73,6 +84,8 @@ pub struct Scene {
     emitters: Vec<Emitter>,
     /// Choice of an emitter by its power; `None` when nothing shines.
     lights: Option<Discrete>,
+    /// Choice of an emitter by where it is seen from, if there is more than one with a place.
+    light_tree: Option<LightTree>,
     environment: Option<EmitterId>,
     bvh: Bvh,
 }
@@ -175,6 +188,11 @@ impl Scene {
         self.lights.is_some()
     }
 
+    /// Whether there is anything that photons could be gathered on.
+    pub fn gathers(&self) -> bool {
+        self.bsdfs.iter().any(|bsdf| [DVec3::Z, -DVec3::Z].iter().any(|wi| bsdf.gathers(*wi)))
+    }
+
     /// All scattering models.
     pub fn bsdfs(&self) -> &[Bsdf] {
         &self.bsdfs
@@ -197,7 +215,12 @@ impl Scene {
     /// Density with which [`Scene::sample_start`] finds `start` on the emitter `id`.
     #[inline]
     pub fn start_pdf(&self, id: EmitterId, start: &Start) -> AreaPdf {
-        let choice = self.lights.as_ref().map_or(0.0, |lights| lights.pdf(id.0 as usize));
-        AreaPdf(self.emitter(id).start_pdf(start).0 * choice)
+        AreaPdf(self.emitter(id).start_pdf(start).0 * self.choice_by_power(id))
+    }
+
+    /// Probability of an emitter where they are chosen by power.
+    #[inline]
+    fn choice_by_power(&self, id: EmitterId) -> f64 {
+        self.lights.as_ref().map_or(0.0, |lights| lights.pdf(id.0 as usize))
     }
 }
