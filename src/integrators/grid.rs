@@ -1,19 +1,22 @@
 //! Photons by place: what lies within a radius of a point.
 
 use glam::{DVec3, IVec3};
+use rayon::prelude::*;
 
 /// Something with a place.
-pub(super) trait Located: Copy {
+pub(super) trait Located: Copy + Send + Sync {
     /// Where it is.
     fn position(&self) -> DVec3;
 }
 
-/// Grids whose cells double in size from one to the next. Radii grow with the distance from the camera; each is served
-/// by the grid whose cells are just as wide as its disk, so that no gather looks at more than eight of them.
+/// Photons, and grids whose cells double in size from one to the next. Radii grow with the distance from the camera; each
+/// is served by the grid whose cells are just as wide as its disk, so that no gather looks at more than eight of them.
 pub(super) struct Grids<T> {
+    /// Along a curve that keeps neighbours close.
+    photons: Vec<T>,
     smallest: f64,
     /// By level; `None` where no radius has that size.
-    levels: Vec<Option<Grid<T>>>,
+    levels: Vec<Option<Grid>>,
 }
 
 impl<T: Located> Grids<T> {
@@ -21,14 +24,16 @@ impl<T: Located> Grids<T> {
     const LEVELS: i32 = 24;
 
     /// Grids of `photons` for searches within `radii`.
-    pub(super) fn new(photons: &[T], radii: impl Iterator<Item = f64> + Clone) -> Self {
+    pub(super) fn new(mut photons: Vec<T>, radii: impl Iterator<Item = f64> + Clone) -> Self {
         let largest = radii.clone().fold(0.0, f64::max);
-        let least = radii.clone().fold(f64::INFINITY, f64::min).max(largest * 0.5f64.powi(Self::LEVELS - 1));
-        let mut grids = Self { smallest: least, levels: Vec::new() };
+        let smallest = radii.clone().fold(f64::INFINITY, f64::min).max(largest * 0.5f64.powi(Self::LEVELS - 1));
+        photons.par_sort_by_cached_key(|photon| along_curve((photon.position() / smallest).floor().as_ivec3()));
+        let mut grids = Self { photons, smallest, levels: Vec::new() };
         for radius in radii {
             let level = grids.level(radius);
             grids.levels.resize_with(grids.levels.len().max(level + 1), || None);
-            grids.levels[level].get_or_insert_with(|| Grid::new(photons, 2.0 * least * 2f64.powi(level as i32)));
+            let cell = 2.0 * smallest * 2f64.powi(level as i32);
+            grids.levels[level].get_or_insert_with(|| Grid::new(&grids.photons, cell));
         }
         grids
     }
@@ -43,37 +48,59 @@ impl<T: Located> Grids<T> {
     #[inline]
     pub(super) fn within(&self, center: DVec3, radius: f64, each: impl FnMut(&T)) {
         if let Some(Some(grid)) = self.levels.get(self.level(radius)) {
-            grid.within(center, radius, each);
+            grid.within(&self.photons, center, radius, each);
         }
     }
 }
 
-/// Photons sorted into the cells of a hashed grid.
-pub(super) struct Grid<T> {
+/// Place of a cell along Morton's curve; cells 2²¹ apart share one.
+fn along_curve(cell: IVec3) -> u64 {
+    let spread = |coordinate: i32| {
+        let mut bits = u64::from(coordinate as u32) & 0x1f_ffff;
+        for (shift, mask) in [
+            (32, 0x001f_0000_0000_ffff),
+            (16, 0x001f_0000_ff00_00ff),
+            (8, 0x100f_00f0_0f00_f00f),
+            (4, 0x10c3_0c30_c30c_30c3),
+            (2, 0x1249_2492_4924_9249),
+        ] {
+            bits = (bits | bits << shift) & mask;
+        }
+        bits
+    };
+    spread(cell.x) | spread(cell.y) << 1 | spread(cell.z) << 2
+}
+
+/// Numbers of photons, sorted into the cells of a hashed grid.
+struct Grid {
     /// Width of a cell.
     cell: f64,
     /// Where the photons of each bucket start; one more entry than there are buckets.
     starts: Vec<u32>,
-    photons: Vec<T>,
+    numbers: Vec<u32>,
 }
 
-impl<T: Located> Grid<T> {
+impl Grid {
     /// A grid with cells of width `cell`.
-    pub(super) fn new(unsorted: &[T], cell: f64) -> Self {
-        let buckets = unsorted.len().next_power_of_two();
-        let mut grid = Self { cell, starts: vec![0; buckets + 1], photons: unsorted.to_vec() };
-        let bucket_of: Vec<usize> =
-            unsorted.iter().map(|photon| grid.bucket(grid.cell_of(photon.position()))).collect();
-        for bucket in &bucket_of {
-            grid.starts[bucket + 1] += 1;
+    fn new<T: Located>(photons: &[T], cell: f64) -> Self {
+        let buckets = photons.len().next_power_of_two();
+        let mut grid = Self { cell, starts: vec![0; buckets + 1], numbers: vec![0; photons.len()] };
+        let bucket_of: Vec<u32> =
+            photons.par_iter().map(|photon| grid.bucket(grid.cell_of(photon.position())) as u32).collect();
+        // Counted two places further on, so that after the sums a bucket's start stands where its end is to be, and moves
+        // there as its photons come in.
+        for &bucket in &bucket_of {
+            if let Some(count) = grid.starts.get_mut(bucket as usize + 2) {
+                *count += 1;
+            }
         }
-        for bucket in 0..buckets {
+        for bucket in 1..buckets {
             grid.starts[bucket + 1] += grid.starts[bucket];
         }
-        let mut next = grid.starts.clone();
-        for (photon, bucket) in unsorted.iter().zip(bucket_of) {
-            grid.photons[next[bucket] as usize] = *photon;
-            next[bucket] += 1;
+        for (number, bucket) in (0u32..).zip(bucket_of) {
+            let end = &mut grid.starts[bucket as usize + 1];
+            grid.numbers[*end as usize] = number;
+            *end += 1;
         }
         grid
     }
@@ -94,7 +121,7 @@ impl<T: Located> Grid<T> {
 
     /// Calls `each` for the photons closer to `center` than `radius`.
     #[inline]
-    pub(super) fn within(&self, center: DVec3, radius: f64, mut each: impl FnMut(&T)) {
+    fn within<T: Located>(&self, photons: &[T], center: DVec3, radius: f64, mut each: impl FnMut(&T)) {
         let (low, high) = (self.cell_of(center - radius), self.cell_of(center + radius));
         for x in low.x..=high.x {
             for y in low.y..=high.y {
@@ -102,7 +129,8 @@ impl<T: Located> Grid<T> {
                     let cell = IVec3::new(x, y, z);
                     let bucket = self.bucket(cell);
                     let range = self.starts[bucket] as usize..self.starts[bucket + 1] as usize;
-                    for photon in &self.photons[range] {
+                    for number in &self.numbers[range] {
+                        let photon = &photons[*number as usize];
                         let near = photon.position().distance_squared(center) < radius * radius;
                         if near && self.cell_of(photon.position()) == cell {
                             each(photon);
@@ -132,7 +160,7 @@ mod tests {
             |scale: f64| DVec3::new(stream.number(), stream.number(), stream.number()) * scale - 0.5 * scale;
         let photons: Vec<DVec3> = (0..5000).map(|_| point(3.0)).collect();
         let radii = [0.01, 0.1, 0.5, 1.0];
-        let grids = Grids::new(&photons, radii.into_iter());
+        let grids = Grids::new(photons.clone(), radii.into_iter());
         for radius in radii {
             for _ in 0..50 {
                 let center = point(3.5);

@@ -16,7 +16,7 @@ use crate::math::{Stream, Walk};
 use crate::paths::{Heuristic, Random, Subpath, VertexKind, trace_light};
 use crate::scene::{Caster, LightChoice, Scene, Surface};
 use crate::spectrum::Spectrum;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
@@ -53,12 +53,12 @@ struct Gather {
 #[derive(Clone, Copy)]
 struct Photon {
     position: DVec3,
-    /// Unit direction back to where it came from.
-    back: DVec3,
-    power: Spectrum,
+    /// Unit direction back to where it came from, up to rounding: photons are many.
+    back: Vec3,
+    power: [f32; 3],
     word: Word,
     /// Edges from the light.
-    edges: usize,
+    edges: u32,
 }
 
 impl Located for Photon {
@@ -96,8 +96,9 @@ impl Sppm {
         let shot: Vec<(Vec<Photon>, u64)> =
             (0..JOBS).into_par_iter().map(|job| self.shoot(scene, pass, job as u64)).collect();
         let rays = walks.iter().map(|w| w.1).sum::<u64>() + shot.iter().map(|s| s.1).sum::<u64>();
-        let photons: Vec<Photon> = shot.into_iter().flat_map(|s| s.0).collect();
-        let grids = Grids::new(&photons, walks.iter().flat_map(|w| &w.0).map(|gather| gather.radius));
+        let mut photons = Vec::with_capacity(shot.iter().map(|s| s.0.len()).sum());
+        photons.extend(shot.into_iter().flat_map(|s| s.0));
+        let grids = Grids::new(photons, walks.iter().flat_map(|w| &w.0).map(|gather| gather.radius));
         film.for_each_band(|index, band| {
             for gather in &walks[index].0 {
                 self.gather(scene, &grids, gather, band);
@@ -168,10 +169,10 @@ impl Sppm {
                 if scene.bsdf(surface.bsdf).gathers(met) {
                     photons.push(Photon {
                         position: vertex.position,
-                        back: vertex.back,
-                        power: vertex.throughput / self.photons as f64,
+                        back: vertex.back.as_vec3(),
+                        power: (vertex.throughput / self.photons as f64).to_rgb().map(|power| power as f32),
                         word: vertex.word,
-                        edges,
+                        edges: edges as u32,
                     });
                 }
             }
@@ -185,16 +186,18 @@ impl Sppm {
         let scale = gather.throughput / (PI * radius * radius);
         grids.within(surface.position, *radius, |photon| {
             let beside = is_beside(photon.position - surface.position, surface.geometric, *radius);
-            if !beside || photon.edges + gather.edges > self.max_depth {
+            if !beside || photon.edges as usize + gather.edges > self.max_depth {
                 return;
             }
-            let wo = surface.frame.to_local(photon.back);
+            let back = photon.back.as_dvec3().normalize();
+            let wo = surface.frame.to_local(back);
             let Some(scattered) = scene.evaluate(surface, wi, wo, Walk::FromCamera) else { return };
             // Photons arrive per true area, scattering counts area seen along the shading normal.
-            let geometric = photon.back.dot(surface.geometric).abs();
+            let geometric = back.dot(surface.geometric).abs();
             let correction = if geometric > 0.0 { wo.z.abs() / geometric } else { 0.0 };
+            let [r, g, b] = photon.power.map(f64::from);
             let class = photon.word.then(scattered.letter).join(gather.word);
-            band.add(gather.pixel, class, scale * scattered.value * photon.power * correction);
+            band.add(gather.pixel, class, scale * scattered.value * Spectrum::rgb(r, g, b) * correction);
         });
     }
 }

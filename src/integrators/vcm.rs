@@ -8,7 +8,7 @@
 //! and shrinks from pass to pass by the rule of Knaus and Zwicker (2011), so that passes are independent estimates.
 
 use super::bdpt::{ROULETTE_FROM, connect_all};
-use super::grid::{Grid, Located};
+use super::grid::{Grids, Located};
 use super::path::film_position;
 use super::photons::{JOBS, is_beside, job_range, shrinkage};
 use super::{Counts, render::Settings};
@@ -87,7 +87,7 @@ impl Vcm {
         let techniques = Techniques { heuristic: Some(self.heuristic), merging };
         let bundles: Vec<Bundle> =
             (0..JOBS).into_par_iter().map(|job| self.shoot(scene, &kernel, size, &techniques, pass, job)).collect();
-        let grid = (self.radius > 0.0).then(|| Grid::new(&photons(&bundles), 2.0 * self.radius));
+        let grids = (self.radius > 0.0).then(|| Grids::new(photons(&bundles), std::iter::once(self.radius)));
         let rays = film.for_each_band(|index, band| {
             let caster = Caster::choosing(scene, self.lights);
             let mut stream = Stream::new(self.seed, &[0, pass, index as u64]);
@@ -111,8 +111,8 @@ impl Vcm {
                         band.add(pixel, found.class, found.value);
                     },
                 );
-                let Some(grid) = &grid else { continue };
-                self.merge_all(&caster, grid, &bundles, &camera.vertices, &techniques, |found| {
+                let Some(grids) = &grids else { continue };
+                self.merge_all(&caster, grids, &bundles, &camera.vertices, &techniques, |found| {
                     band.add(pixel, found.class, found.value);
                 });
             }
@@ -163,7 +163,7 @@ impl Vcm {
     fn merge_all(
         &self,
         scene: &Caster<'_>,
-        grid: &Grid<Photon>,
+        grids: &Grids<Photon>,
         bundles: &[Bundle],
         camera: &[Vertex],
         techniques: &Techniques,
@@ -172,7 +172,7 @@ impl Vcm {
         for t in 2..=camera.len() {
             let end = &camera[t - 1];
             let Some(surface) = end.surface().filter(|_| end.connects) else { continue };
-            grid.within(end.position, self.radius, |photon| {
+            grids.within(end.position, self.radius, |photon| {
                 let beside = is_beside(photon.position - end.position, surface.geometric, self.radius);
                 let light = &bundles[photon.job as usize].vertices[photon.start as usize..photon.end as usize];
                 // Both subpaths hold the vertex: a path of s + t − 1 vertices has s + t − 2 edges.
