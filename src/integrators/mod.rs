@@ -12,7 +12,7 @@ mod render;
 mod sppm;
 mod vcm;
 
-pub use render::{Budget, Outcome, Progress, Settings, render};
+pub use render::{Budget, LEAST_PASSES, Outcome, Progress, Settings, render};
 
 use crate::film::Film;
 use crate::scene::Scene;
@@ -44,6 +44,14 @@ impl Method {
             Self::Sppm => "sppm",
             Self::Vcm => "vcm",
             Self::Mmlt => "mmlt",
+        }
+    }
+
+    /// Whether a render can go on from its film: its passes know nothing of each other but their number.
+    pub fn resumes(self) -> bool {
+        match self {
+            Self::Path | Self::Bdpt | Self::Sppm | Self::Vcm => true,
+            Self::Mmlt => false,
         }
     }
 }
@@ -94,6 +102,16 @@ impl Integrator {
             Method::Sppm => Self::Sppm(sppm::Sppm::start(scene, settings)),
             Method::Vcm => Self::Vcm(vcm::Vcm::start(scene, settings)),
             Method::Mmlt => Self::Mmlt(Box::new(mmlt::Mmlt::start(scene, settings))),
+        }
+    }
+
+    /// Goes on after `passes` as if it had made them. Only what depends on the number of a pass can be skipped: chains are
+    /// where they have walked to, so a render by chains must not go on from a film alone ([`Method::resumes`]).
+    fn skip(&mut self, passes: u64) {
+        match self {
+            Self::Path(_) | Self::Bdpt(_) | Self::Mmlt(_) => {}
+            Self::Sppm(sppm) => (0..passes).for_each(|pass| sppm.shrink(pass)),
+            Self::Vcm(vcm) => (0..passes).for_each(|pass| vcm.shrink(pass)),
         }
     }
 
