@@ -4,14 +4,20 @@
 //! A new method: its file with `start` and `pass`, and one arm in each match below.
 
 mod bdpt;
+mod checkpoint;
 mod grid;
+mod merge;
 mod mmlt;
 mod path;
 mod photons;
+mod reference;
 mod render;
 mod sppm;
 mod vcm;
 
+pub use checkpoint::CheckpointError;
+pub use merge::{MergeError, merge, summary as merge_summary};
+pub use reference::{Keep, ReferenceError, reference, usual_method};
 pub use render::{Budget, LEAST_PASSES, Outcome, Progress, Settings, render};
 
 use crate::film::Film;
