@@ -140,17 +140,17 @@ fn a_reference_stops_when_its_error_is_small_and_can_be_made_better() {
     assert!(error(&first, "relative").max(error(&first, "halves")) <= 0.3 && error(&first, "relative_trimmed") > 0.0);
     let again = refer(path, &["--error", "30%"]);
     assert_eq!(again["passes"], first["passes"], "nothing is left to do");
-    let better = refer(path, &["--error", "8%", "--threads", "1"]);
+    let better = refer(path, &["--error", "3%", "--threads", "1"]);
     assert!(better["passes"].as_u64() > first["passes"].as_u64(), "{better}");
     let image = read(path, "out.exr");
     fs::remove_file(path.join("out.exr.checkpoint")).unwrap();
-    let afresh = refer(path, &["--error", "8%", "--threads", "2"]);
+    let afresh = refer(path, &["--error", "3%", "--threads", "2"]);
     assert_eq!(better["passes"], afresh["passes"], "the way does not matter");
     assert!(image.layers == read(path, "out.exr").layers);
     assert_eq!(image.manifest["error"], read(path, "out.exr").manifest["error"]);
-    let output = refer_command(path, &["--error", "8%"]).output().unwrap();
+    let output = refer_command(path, &["--error", "3%"]).output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
-    assert!(text.contains("8 % reached") && text.contains("two halves"), "{text}");
+    assert!(text.contains("3 % reached") && text.contains("two halves"), "{text}");
 }
 
 #[test]

@@ -99,7 +99,8 @@ impl Reference {
             },
         );
         let end = if reached { "reached" } else { "not reached: the time is up" };
-        let asked = self.error * 100.0;
+        // Rounded back to what the user wrote.
+        let asked = (self.error * 1e8).round() / 1e6;
         say(format_args!("{name}: {passes} passes in {wall:.2} s: {error}; {asked} % {end}; {}", outcome.health))
     }
 }
