@@ -4,7 +4,9 @@ mod auto;
 mod blend;
 mod compare;
 mod import;
+mod merge;
 mod progress;
+mod reference;
 mod render;
 mod train;
 
@@ -28,6 +30,12 @@ enum Verb {
     /// Render a scene with one method.
     #[command(after_help = "Example: pathblend render scenes/box/scene.xml -i bdpt --time 10s -o box.exr")]
     Render(render::Render),
+    /// Render a scene until its noise is as small as you ask, with a checkpoint to go on from.
+    #[command(after_help = "Example: pathblend reference scenes/box/scene.xml --error 2% --time 1h -o reference.exr")]
+    Reference(reference::Reference),
+    /// Merge runs of one render with different seeds.
+    #[command(after_help = "Example: pathblend merge seed1.exr seed2.exr -o merged.exr")]
+    Merge(merge::Merge),
     /// Measure how far an image is from a reference.
     #[command(after_help = "Example: pathblend compare box.exr reference.exr --json")]
     Compare(compare::Compare),
@@ -52,6 +60,8 @@ enum Verb {
 pub fn run(arguments: Arguments) -> anyhow::Result<()> {
     match arguments.verb {
         Verb::Render(render) => render.run(),
+        Verb::Reference(reference) => reference.run(),
+        Verb::Merge(merge) => merge.run(),
         Verb::Compare(compare) => compare.run(),
         Verb::Train(train) => train.run(),
         Verb::Blend(blend) => blend.run(),

@@ -31,13 +31,14 @@ impl Reporter {
 
     /// Shows `progress`.
     pub(super) fn update(&mut self, progress: Progress) {
+        let error = progress.error.map_or_else(String::new, |share| format!(", error {:.2} %", share * 100.0));
         match self {
             Self::Bar(bar) => {
-                bar.set_prefix(format!("{} passes", progress.passes));
+                bar.set_prefix(format!("{} passes{error}", progress.passes));
                 bar.set_position((progress.fraction * 1000.0) as u64);
             }
             Self::Lines { what, last } if last.elapsed() >= LINE_EVERY => {
-                eprintln!("{what}: {:.0} %, {} passes", progress.fraction * 100.0, progress.passes);
+                eprintln!("{what}: {:.0} %, {} passes{error}", progress.fraction * 100.0, progress.passes);
                 *last = Instant::now();
             }
             Self::Lines { .. } => {}

@@ -1,14 +1,19 @@
 //! Some rows of the film.
 
+use super::noise::{Batch, Moments};
 use super::{Health, Kernel, PathClass, Splat, class::CLASSES};
 use crate::spectrum::Spectrum;
+use serde::{Deserialize, Serialize};
 
 /// Sums for the pixels of some rows.
+#[derive(Serialize, Deserialize)]
 pub struct Band {
     width: usize,
     first_row: usize,
     rows: usize,
     colour: Vec<[f64; 3]>,
+    /// What the batches of passes had to say about `colour`.
+    moments: Vec<Moments>,
     /// Luminance per class and pixel; classes that have not occurred have no memory. Empty when none are kept.
     classes: Vec<Option<Box<[f64]>>>,
     /// What went wrong in these rows.
@@ -22,6 +27,7 @@ impl Band {
             first_row,
             rows,
             colour: vec![[0.0; 3]; width * rows],
+            moments: vec![Moments::default(); width * rows],
             classes: if features { vec![None; CLASSES] } else { Vec::new() },
             health: Health::default(),
         }
@@ -33,10 +39,10 @@ impl Band {
         (first..end).flat_map(move |y| (0..width).map(move |x| [x, y]))
     }
 
-    /// Adds `value` to the pixel (x, y), which lies in this band. What is not a valid contribution is counted instead.
+    /// Adds `value` to a pixel, which lies in this band. What is not a valid contribution is counted instead.
     #[inline]
-    pub fn add(&mut self, [x, y]: [usize; 2], class: PathClass, value: Spectrum) {
-        self.add_at((y - self.first_row) * self.width + x, class, value);
+    pub fn add(&mut self, pixel: [usize; 2], class: PathClass, value: Spectrum) {
+        self.add_at(self.index(pixel), class, value);
     }
 
     /// Adds a splat to the pixels of the band that the filter reaches; `size` is that of the film.
@@ -72,12 +78,41 @@ impl Band {
         self.classes.get(class.code()).is_some_and(Option::is_some)
     }
 
-    pub(super) fn colour(&self, x: usize, y: usize) -> [f64; 3] {
-        self.colour[(y - self.first_row) * self.width + x]
+    #[inline]
+    fn index(&self, [x, y]: [usize; 2]) -> usize {
+        (y - self.first_row) * self.width + x
     }
 
-    pub(super) fn luminance(&self, class: PathClass, x: usize, y: usize) -> f64 {
+    pub(super) fn colour(&self, pixel: [usize; 2]) -> [f64; 3] {
+        self.colour[self.index(pixel)]
+    }
+
+    pub(super) fn luminance(&self, class: PathClass, pixel: [usize; 2]) -> f64 {
         let layer = self.classes.get(class.code()).and_then(Option::as_ref);
-        layer.map_or(0.0, |layer| layer[(y - self.first_row) * self.width + x])
+        layer.map_or(0.0, |layer| layer[self.index(pixel)])
+    }
+
+    /// Takes note of the passes since the last batch.
+    pub(super) fn end_batch(&mut self, batch: Batch) {
+        self.moments.iter_mut().zip(&self.colour).for_each(|(moments, sum)| moments.add(batch, *sum));
+    }
+
+    /// The moments of a pixel, with those of a batch that is not full.
+    pub(super) fn moments(&self, pixel: [usize; 2], last: Option<Batch>) -> Moments {
+        let index = self.index(pixel);
+        let mut moments = self.moments[index];
+        if let Some(last) = last {
+            moments.add(last, self.colour[index]);
+        }
+        moments
+    }
+
+    /// Whether it has the form of `other`: rows, and whether it keeps classes.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        let form = |band: &Self| (band.width, band.first_row, band.rows, band.classes.len());
+        let (pixels, layers) = (self.width * self.rows, self.classes.iter().flatten());
+        form(self) == form(other)
+            && [self.colour.len(), self.moments.len()] == [pixels; 2]
+            && layers.into_iter().all(|layer| layer.len() == pixels)
     }
 }

@@ -7,23 +7,27 @@
 mod band;
 mod class;
 mod kernel;
+mod noise;
 mod splat;
 
 pub use band::Band;
 pub use class::{PathClass, Word};
 pub use kernel::{Filter, Kernel};
+pub use noise::{NoiseEstimate, VARIANCE_LAYER};
 pub use splat::{Splat, Splats};
 
 use crate::image::{Image, Layer};
 use crate::spectrum::Spectrum;
-use ndarray::{Array2, Array3};
+use ndarray::{Array2, Array3, Axis};
+use noise::Batches;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// Rows in a band. Small enough that two threads share a film evenly, large enough that a band amortises its job.
 pub const BAND_ROWS: usize = 8;
 
 /// Counters of what went wrong, never silently dropped.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Health {
     /// Contributions that were infinite or not a number; left out.
     pub nonfinite: u64,
@@ -59,17 +63,24 @@ impl Health {
     }
 }
 
-/// Sums over passes: colour and class luminances per pixel.
+/// Sums over passes: colour and class luminances per pixel, and how they came about.
 pub struct Film {
     /// Width and height in pixels.
     pub size: [usize; 2],
     /// Reconstruction filter.
     pub kernel: Kernel,
-    bands: Vec<Band>,
     /// Whether class luminances are kept.
     features: bool,
+    sums: Sums,
+}
+
+/// All that passes change in a film: with it a render can go on later.
+#[derive(Serialize, Deserialize)]
+pub struct Sums {
+    bands: Vec<Band>,
     /// What went wrong before it reached a band.
     elsewhere: Health,
+    batches: Batches,
 }
 
 impl Film {
@@ -81,18 +92,34 @@ impl Film {
                 Band::new(size[0], first_row, BAND_ROWS.min(size[1] - first_row), features)
             })
             .collect();
-        Self { size, kernel: Kernel::new(filter), bands, features, elsewhere: Health::default() }
+        let sums = Sums { bands, elsewhere: Health::default(), batches: Batches::default() };
+        Self { size, kernel: Kernel::new(filter), features, sums }
+    }
+
+    /// What passes have changed so far.
+    pub fn sums(&self) -> &Sums {
+        &self.sums
+    }
+
+    /// Goes on from `sums`; `false`, and nothing changes, where they are those of a film of another form.
+    pub fn restore(&mut self, sums: Sums) -> bool {
+        let fits = sums.bands.len() == self.sums.bands.len()
+            && sums.bands.iter().zip(&self.sums.bands).all(|(new, old)| new.is_like(old));
+        if fits {
+            self.sums = sums;
+        }
+        fits
     }
 
     /// Runs `job` once for each band, in parallel; results in the order of the bands.
     pub fn for_each_band<R: Send>(&mut self, job: impl Fn(usize, &mut Band) -> R + Sync) -> Vec<R> {
-        self.bands.par_iter_mut().enumerate().map(|(index, band)| job(index, band)).collect()
+        self.sums.bands.par_iter_mut().enumerate().map(|(index, band)| job(index, band)).collect()
     }
 
     /// Adds the splats of some jobs, in the order of the jobs.
     pub fn splat(&mut self, jobs: &[Splats]) {
         let (kernel, size) = (&self.kernel, self.size);
-        self.bands.par_iter_mut().enumerate().for_each(|(index, band)| {
+        self.sums.bands.par_iter_mut().enumerate().for_each(|(index, band)| {
             for splats in jobs {
                 for splat in splats.band(index) {
                     band.splat(kernel, size, splat);
@@ -103,24 +130,23 @@ impl Film {
 
     /// Adds what went wrong before it reached the film.
     pub fn report(&mut self, health: &Health) {
-        self.elsewhere.add(health);
+        self.sums.elsewhere.add(health);
     }
 
     /// What went wrong so far.
     pub fn health(&self) -> Health {
-        let mut health = self.elsewhere;
-        self.bands.iter().for_each(|band| health.add(&band.health));
+        let mut health = self.sums.elsewhere;
+        self.sums.bands.iter().for_each(|band| health.add(&band.health));
         health
     }
 
-    /// The image: sums divided by the number of passes, class layers named `path_LDE` and so on.
-    pub fn develop(&self, passes: f64) -> Image {
+    /// The image: sums divided by the number of passes, class layers named `path_LDE` and so on, and the variance of the
+    /// colour where there are passes enough to tell.
+    pub fn develop(&self) -> Image {
         let [width, height] = self.size;
         let mut image = Image::new(width, height);
-        image.colour = Array3::from_shape_fn((height, width, 3), |(y, x, c)| {
-            (self.bands[y / BAND_ROWS].colour(x, y)[c] / passes) as f32
-        });
-        let occurs = |class| self.bands.iter().any(|band| band.has(class));
+        image.colour = self.colour();
+        let occurs = |class| self.sums.bands.iter().any(|band| band.has(class));
         // An image without any light still says that it has class layers.
         let dark = self.features && !PathClass::all().any(occurs);
         for class in PathClass::all() {
@@ -128,10 +154,34 @@ impl Film {
                 continue;
             }
             let layer = Array2::from_shape_fn((height, width), |(y, x)| {
-                (self.bands[y / BAND_ROWS].luminance(class, x, y) / passes) as f32
+                (self.sums.bands[y / BAND_ROWS].luminance(class, [x, y]) / self.divisor()) as f32
             });
             image.layers.insert(class.layer_name(), Layer::Luminance(layer));
         }
+        if let Some(variance) = self.variance() {
+            image.layers.insert(VARIANCE_LAYER.to_owned(), Layer::Colour(variance));
+        }
         image
+    }
+
+    /// What sums are divided by: the number of passes, or 1 where there are none.
+    fn divisor(&self) -> f64 {
+        self.passes().max(1) as f64
+    }
+
+    fn colour(&self) -> Array3<f32> {
+        self.picture(|band, pixel| band.colour(pixel).map(|sum| sum / self.divisor()))
+    }
+
+    /// One colour for each pixel, height × width × 3.
+    fn picture(&self, value: impl Fn(&Band, [usize; 2]) -> [f64; 3] + Sync) -> Array3<f32> {
+        let mut picture = Array3::zeros((self.size[1], self.size[0], 3));
+        let rows: Vec<_> = picture.axis_chunks_iter_mut(Axis(0), BAND_ROWS).collect();
+        rows.into_par_iter().zip(&self.sums.bands).for_each(|(mut rows, band)| {
+            for (mut lane, pixel) in rows.lanes_mut(Axis(2)).into_iter().zip(band.pixels()) {
+                lane.iter_mut().zip(value(band, pixel)).for_each(|(channel, v)| *channel = v as f32);
+            }
+        });
+        picture
     }
 }

@@ -110,6 +110,28 @@ pub fn compare(image: &Image, reference: &Image) -> Result<Metrics, ImageError> 
     })
 }
 
+/// How far an image is expected to be from the truth, as its own noise has it: the roots of the expected [`Metrics::relmse`]
+/// and [`Metrics::relmse_trimmed`], with the image in the place of the reference in the denominator.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Expected {
+    /// Root of the mean of σ² / (I² + ε).
+    pub relative: f64,
+    /// The same without the 0.1 % of the pixels where it is largest.
+    pub relative_trimmed: f64,
+}
+
+impl Expected {
+    /// From `colour` and the variances of its channels, both height × width × 3. Pixels that are not finite are left out;
+    /// `None` where that leaves none.
+    pub fn of(colour: ArrayView3<'_, f32>, variance: ArrayView3<'_, f32>) -> Option<Self> {
+        let pixels = finite_pixels(colour, variance);
+        // Here the second of the pair is the variance.
+        let relative = |i: f64, variance: f64| variance / (i * i + EPSILON);
+        let measure = (!pixels.is_empty()).then(|| Measure::of(&pixels, relative))?;
+        Some(Self { relative: measure.mean.sqrt(), relative_trimmed: measure.trimmed.sqrt() })
+    }
+}
+
 /// The ꟻLIP error of every pixel in [0, 1], height × width.
 ///
 /// This is LDR-ꟻLIP at its authors' viewing distance (67 pixels per degree) on the images as 8-bit sRGB:

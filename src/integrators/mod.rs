@@ -4,17 +4,23 @@
 //! A new method: its file with `start` and `pass`, and one arm in each match below.
 
 mod bdpt;
+mod checkpoint;
 mod grid;
 mod light;
+mod merge;
 mod mmlt;
 mod path;
 mod photons;
+mod reference;
 mod render;
 mod sppm;
 mod vcm;
 
+pub use checkpoint::CheckpointError;
+pub use merge::{MergeError, merge, summary as merge_summary};
 pub use photons::MOST_PHOTONS;
-pub use render::{Budget, Outcome, Progress, Settings, render};
+pub use reference::{Keep, ReferenceError, reference, usual_method};
+pub use render::{Budget, LEAST_PASSES, Outcome, Progress, Settings, render};
 
 use crate::film::Film;
 use crate::scene::Scene;
@@ -49,6 +55,14 @@ impl Method {
             Self::Sppm => "sppm",
             Self::Vcm => "vcm",
             Self::Mmlt => "mmlt",
+        }
+    }
+
+    /// Whether a render can go on from its film: its passes know nothing of each other but their number.
+    pub fn resumes(self) -> bool {
+        match self {
+            Self::Path | Self::Light | Self::Bdpt | Self::Sppm | Self::Vcm => true,
+            Self::Mmlt => false,
         }
     }
 }
@@ -101,6 +115,16 @@ impl Integrator {
             Method::Sppm => Self::Sppm(sppm::Sppm::start(scene, settings)),
             Method::Vcm => Self::Vcm(vcm::Vcm::start(scene, settings)),
             Method::Mmlt => Self::Mmlt(Box::new(mmlt::Mmlt::start(scene, settings))),
+        }
+    }
+
+    /// Goes on after `passes` as if it had made them. Only what depends on the number of a pass can be skipped: chains are
+    /// where they have walked to, so a render by chains must not go on from a film alone ([`Method::resumes`]).
+    fn skip(&mut self, passes: u64) {
+        match self {
+            Self::Path(_) | Self::Light(_) | Self::Bdpt(_) | Self::Mmlt(_) => {}
+            Self::Sppm(sppm) => (0..passes).for_each(|pass| sppm.shrink(pass)),
+            Self::Vcm(vcm) => (0..passes).for_each(|pass| vcm.shrink(pass)),
         }
     }
 

@@ -105,6 +105,11 @@ impl Sppm {
             }
         });
         counts.add((self.photons + size[0] * size[1]) as u64, rays);
+        self.shrink(pass);
+    }
+
+    /// What pass number `pass` leaves of the radius.
+    pub(super) fn shrink(&mut self, pass: u64) {
         self.shrinkage *= shrinkage(pass);
     }
 

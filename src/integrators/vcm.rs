@@ -122,6 +122,11 @@ impl Vcm {
         counts.add((self.paths + pixels) as u64, rays);
         let splats: Vec<Splats> = bundles.into_iter().map(|bundle| bundle.splats).collect();
         film.splat(&splats);
+        self.shrink(pass);
+    }
+
+    /// What pass number `pass` leaves of the radius.
+    pub(super) fn shrink(&mut self, pass: u64) {
         self.radius *= shrinkage(pass).sqrt();
     }
 
