@@ -5,6 +5,7 @@ use glam::{DVec3, Vec3};
 use pathblend::geometry::{Bvh, Primitive, Ray};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus as Rng;
+use rayon::prelude::*;
 
 type Mesh = (Vec<Vec3>, Vec<[u32; 3]>);
 
@@ -114,6 +115,27 @@ fn no_ray_leaves_a_cube() {
             assert_eq!(misses(&mesh, 500_000, scale, shift, &mut rng), 0, "scale {scale}, shift {shift}, {n} squares");
         }
     }
+}
+
+/// As above with a hundred million rays, which take minutes: `cargo test --release --test bvh_watertight -- --ignored`.
+#[test]
+#[ignore = "long"]
+fn no_ray_of_a_hundred_million_leaves() {
+    const RAYS: usize = 100_000_000;
+    let jobs: Vec<(f64, f64, u64)> =
+        PLACES.iter().flat_map(|&(scale, shift)| (0..16).map(move |job| (scale, shift, job))).collect();
+    let missed: usize = jobs
+        .par_iter()
+        .map(|&(scale, shift, job)| {
+            let mut rng = Rng::seed_from_u64(100 + job);
+            let shift = shift * DVec3::new(1.0, -0.7, 0.9);
+            let rays = RAYS / jobs.len() / 2;
+            let round = sphere(if shift == DVec3::ZERO { 100 } else { 12 }, scale, shift);
+            let flat = cube(8, scale, shift);
+            misses(&round, rays, scale, shift, &mut rng) + misses(&flat, rays, scale, shift, &mut rng)
+        })
+        .sum();
+    assert_eq!(missed, 0, "of {RAYS} rays");
 }
 
 /// Along the axes, from inside and from far outside, through grid points, edges and along the faces themselves.
