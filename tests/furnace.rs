@@ -233,7 +233,9 @@ fn every_model_shows_its_albedo() {
             // How far it is from one of twice the step bounds what is left of its error.
             let error = (albedo(&scene, 200) - expected).abs() + 1e-5;
             assert!(error < 1e-3, "{name}: the quadrature is too coarse: {error}");
-            assert!(expected <= 1.0 + error, "{name} makes light: {expected}");
+            // Half of a glass body is a lens for radiance: from within, what comes in from outside is η² times as bright.
+            let most = if bsdf.transmits() { 1.5f64.powi(2) } else { 1.0 };
+            assert!(expected <= most + error, "{name} makes light: {expected}");
             for method in METHODS {
                 let found = estimate(&images(&scene, method, 4), colour_mean);
                 worst.expect(method, &format!("{name}, side {side}"), found, Estimate::exact(expected, error));
@@ -260,9 +262,9 @@ fn clear_models_are_invisible() {
     worst.print();
 }
 
-/// A pane of rough glass between mirrors, where light scatters on both faces many times over: no closed form, but all
-/// methods agree with path tracing, path length by path length, and none shows more than 1. Faces are flat, so that a
-/// photon's neighbour sees the same light.
+/// A pane of rough glass with a mirror around its rim, where light scatters on both faces many times over: no closed form,
+/// but all methods agree with path tracing, path length by path length, and none shows more than 1. Faces are flat and
+/// the rim is many thicknesses away, so that a photon's neighbour sees the same light of each length.
 #[test]
 fn panes_of_rough_glass_lose_but_do_not_gain() {
     let mut worst = Worst::default();
@@ -273,13 +275,13 @@ fn panes_of_rough_glass_lose_but_do_not_gain() {
     ] {
         let mut builder = Builder::new();
         let (bsdf, mirror) = (builder.bsdf(bsdf), builder.bsdf(mirror()));
-        let half_height = DVec3::Z * 0.3;
+        let half_height = DVec3::Z * 0.1;
         builder.solid(Solid::disk(half_height, DVec3::Z, 1.0), bsdf, None).unwrap();
         builder.solid(Solid::disk(-half_height, -DVec3::Z, 1.0), bsdf, None).unwrap();
         builder.solid(Solid::cylinder(-half_height, half_height, 1.0), mirror, None).unwrap();
         builder.emitter(Shine::Environment(Spectrum::ONE)).unwrap();
         let back = DVec3::new(0.48, 0.0, 0.8772684879784524);
-        let scene = build(builder, parallel(SIZE, 0.4, back * 5.0 + half_height, -back), 8);
+        let scene = build(builder, parallel(SIZE, 0.3, back * 5.0 + half_height, -back), 8);
         agree(&scene, name, 16, &mut worst);
     }
     worst.print();
