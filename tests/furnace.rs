@@ -256,7 +256,11 @@ fn clear_models_are_invisible() {
         builder.emitter(Shine::Environment(Spectrum::ONE)).unwrap();
         let scene = build(builder, parallel(8, 1.0, DVec3::new(0.0, 0.0, -4.0), DVec3::Z), 40);
         for method in METHODS {
-            worst.expect(method, name, estimate(&images(&scene, method, 4), colour_mean), Estimate::exact(1.0, 0.0));
+            // Only roulette makes noise, and so rarely that it takes many paths to tell. Chains know no roulette, and look
+            // for light of dozens of lengths in each pass.
+            let passes = if method == Method::Mmlt { 4 } else { 64 };
+            let found = estimate(&images(&scene, method, passes), colour_mean);
+            worst.expect(method, name, found, Estimate::exact(1.0, 0.0));
         }
     }
     worst.print();
@@ -281,8 +285,8 @@ fn panes_of_rough_glass_lose_but_do_not_gain() {
         builder.solid(Solid::cylinder(-half_height, half_height, 1.0), mirror, None).unwrap();
         builder.emitter(Shine::Environment(Spectrum::ONE)).unwrap();
         let back = DVec3::new(0.48, 0.0, 0.8772684879784524);
-        let scene = build(builder, parallel(SIZE, 0.3, back * 5.0 + half_height, -back), 8);
-        agree(&scene, name, 16, &mut worst);
+        let scene = build(builder, parallel(SIZE, 0.3, back * 5.0 + half_height, -back), 5);
+        agree(&scene, name, 32, &mut worst);
     }
     worst.print();
 }
@@ -314,6 +318,10 @@ fn agree(scene: &Scene, name: &str, passes: u64, worst: &mut Worst) {
     let path = light(Method::Path);
     for method in METHODS {
         for (index, (found, expected)) in light(method).into_iter().zip(&path).enumerate() {
+            // Of light that few photons carry, a spread over runs says nothing.
+            if expected.mean < 0.02 {
+                continue;
+            }
             let what = format!("{name}, {} edges", index + 2);
             assert!(found.mean < 1.0 + SIGMAS * found.error + 1e-5, "{method:?}, {what}: {found:?} is too bright");
             worst.expect(method, &what, found, *expected);
