@@ -245,6 +245,20 @@ fn every_model_shows_its_albedo() {
     worst.print();
 }
 
+/// The simplest model by many paths, so that a density which is off by a few parts in a hundred shows, although it has a
+/// share in the weights only.
+#[test]
+fn paint_under_an_even_sky_is_exact() {
+    let mut worst = Worst::default();
+    let scene = disk(paint(), 1.0);
+    let expected = (0.2 + 0.5 + 0.9) / 3.0;
+    for method in METHODS {
+        let found = estimate(&images(&scene, method, 100), colour_mean);
+        worst.expect(method, "diffuse", found, Estimate::exact(expected, 0.0));
+    }
+    worst.print();
+}
+
 /// Balls of all that loses nothing, seen as a whole.
 #[test]
 fn clear_models_are_invisible() {
