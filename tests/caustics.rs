@@ -133,3 +133,24 @@ fn a_ball_of_glass_focuses_the_flux_that_passes_it() {
     }
     worst.print();
 }
+
+/// A floor at the bottom of a medium: the surface lets power pass, (1 − R) of it, on the way in, and radiance, squeezed by
+/// η², on the way out. Only photons find it, since both walks have to refract.
+#[test]
+fn a_floor_under_a_surface_shows_power_in_and_radiance_out() {
+    let towards = DVec3::new(0.6, 0.0, 0.8);
+    let mut builder = Builder::new();
+    floor(&mut builder, 0.7, DVec3::Z);
+    let bsdf = builder.bsdf(glass(ETA));
+    builder.solid(Solid::disk(DVec3::Z * 0.5, DVec3::Z, 1.0), bsdf, None).unwrap();
+    builder.emitter(Shine::Directional(towards, Spectrum::grey(IRRADIANCE))).unwrap();
+    let scene = build(builder, parallel(SIZE, 0.4, DVec3::Z, -DVec3::Z), 5);
+    let arrives = IRRADIANCE * towards.z * (1.0 - reflectance(towards.z.acos(), ETA));
+    let expected = arrives * REFLECTANCE / PI * (1.0 - reflectance(0.0, ETA)) / (ETA * ETA);
+    let mut worst = Worst::default();
+    for method in [Method::Sppm, Method::Vcm] {
+        let found = estimate(&images(&scene, method, 80), |image| class_mean(image, "LSDSE"));
+        worst.expect(method, "LSDSE", found, Estimate::exact(expected, 0.0));
+    }
+    worst.print();
+}
