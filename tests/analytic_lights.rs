@@ -78,6 +78,17 @@ fn parallel_light_falls_off_with_the_cosine() {
     expect(&build(builder), 8, 5.0 * 0.8);
 }
 
+/// Each light is chosen with a probability of its own, and what it gives does not depend on that.
+#[test]
+fn lights_of_different_power_add_up() {
+    let mut builder = floor();
+    builder.emitter(Shine::Directional(DVec3::new(0.6, 0.0, 0.8), Spectrum::grey(5.0))).unwrap();
+    // Straight above the place that the camera sees.
+    builder.emitter(Shine::Point(DVec3::new(1.0, 0.0, 2.0), Spectrum::grey(4.0))).unwrap();
+    builder.emitter(Shine::Point(DVec3::new(1.0, 0.0, 4.0), Spectrum::grey(30.0))).unwrap();
+    expect(&build(builder), 32, 5.0 * 0.8 + 4.0 / 4.0 + 30.0 / 16.0);
+}
+
 /// At the camera's place the intensity is between the full one and none.
 #[test]
 fn a_spot_light_fades_to_its_edge() {

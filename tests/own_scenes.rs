@@ -203,14 +203,14 @@ impl Deviations {
 }
 
 /// All classes that carry a thousandth of the light, all scenes, all methods: prints the table that it checks. Takes some
-/// twenty minutes.
+/// forty minutes.
 ///
 /// Of `mmlt` those classes are judged of which bdpt knows the light to a percent. The others have one technique only and
 /// hardly ever find light by it; a chain that comes upon one stays for longer than these runs last, so that most runs
 /// miss it and their spread says nothing of that.
 ///
-/// Of `sppm` it is judged how the bias falls: ten times the passes shrink the radius to 10^(−1/6) of it, and the bias at
-/// least in proportion, where it comes from borders.
+/// Of `sppm` and `vcm` it is judged how the bias falls: ten times the passes shrink the radius to 10^(−1/6) of it, and the
+/// bias at least in proportion, where it comes from borders.
 #[test]
 #[ignore = "long: cargo test --release --test own_scenes -- --ignored --nocapture"]
 fn methods_agree_class_by_class_on_every_scene() {
@@ -221,8 +221,9 @@ fn methods_agree_class_by_class_on_every_scene() {
         let bdpt = classes(&scene, Method::Bdpt, 80, 16);
         let path = classes(&scene, Method::Path, 250, 16);
         let mmlt = classes(&scene, Method::Mmlt, 150, 16);
-        let (few, many) = (classes(&scene, Method::Sppm, 100, 16), classes(&scene, Method::Sppm, 1000, 8));
-        let mut deviations: [Deviations; 3] = Default::default();
+        let merging = [Method::Sppm, Method::Vcm];
+        let merging = merging.map(|method| (classes(&scene, method, 100, 16), classes(&scene, method, 1000, 8)));
+        let mut deviations: [Deviations; 4] = Default::default();
         for (word, &(truth, error)) in bdpt.iter().filter(|(_, class)| class.0 >= 1e-3 * bdpt["all"].0) {
             // What only a point light makes, no walk from the camera finds.
             if name != "bokeh" || !(word.contains("LS") || word == "all") {
@@ -233,12 +234,15 @@ fn methods_agree_class_by_class_on_every_scene() {
                 let (mean, own) = class(&mmlt, word);
                 deviations[1].add(word, (mean - truth).abs() / error.hypot(own), mean / truth - 1.0);
             }
-            let ((few, error_few), (many, error_many)) = (class(&few, word), class(&many, word));
-            let excess = (many - truth).abs() - 0.8 * (few - truth).abs();
-            deviations[2].add(word, excess / error.hypot(error_many).hypot(0.8 * error_few), many / truth - 1.0);
+            for (deviations, (few, many)) in deviations[2..].iter_mut().zip(&merging) {
+                let ((few, error_few), (many, error_many)) = (class(few, word), class(many, word));
+                let excess = (many - truth).abs() - 0.8 * (few - truth).abs();
+                deviations.add(word, excess / error.hypot(error_many).hypot(0.8 * error_few), many / truth - 1.0);
+            }
         }
+        let [(_, sppm), (_, vcm)] = merging;
         for ((method, light), deviations) in
-            [("path", path), ("mmlt", mmlt), ("sppm", many)].into_iter().zip(deviations)
+            [("path", path), ("mmlt", mmlt), ("sppm", sppm), ("vcm", vcm)].into_iter().zip(deviations)
         {
             deviations.print(name, method, light["all"].0 / bdpt["all"].0);
             all.push((name, method, deviations.worst));
