@@ -6,7 +6,7 @@ use glam::DVec3;
 use pathblend::bsdf::Bsdf;
 use pathblend::load::{self, Options};
 use pathblend::math::Walk;
-use pathblend::texture::Spot;
+use pathblend::texture::Site;
 
 /// Mitsuba computes in single precision.
 const TOLERANCE: f64 = 1e-4;
@@ -35,7 +35,7 @@ fn values_are_those_of_mitsuba() {
         }
         let numbers: Vec<f64> = rest.split(' ').map(|word| word.parse().unwrap()).collect();
         let [wi, wo] = [0, 3].map(|i| DVec3::from_slice(&numbers[i..]).normalize());
-        let evaluation = model.as_ref().unwrap().evaluate(&Spot::default(), wi, wo, Walk::FromCamera);
+        let evaluation = model.as_ref().unwrap().evaluate(&Site::default(), wi, wo, Walk::FromCamera);
         let found = evaluation.map_or([0.0; 3], |evaluation| (evaluation.value * wo.z.abs()).to_rgb());
         let expected = &numbers[6..9];
         let scale = expected.iter().fold(0.0, |a: f64, b| a.max(*b));

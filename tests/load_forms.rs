@@ -7,7 +7,7 @@ use pathblend::bsdf::Bsdf;
 use pathblend::emitter::Emitter;
 use pathblend::load::{self, Loaded, Options};
 use pathblend::scene::{Caster, Scene};
-use pathblend::texture::Spot;
+use pathblend::texture::Site;
 use std::path::Path;
 
 const SENSOR: &str = "<sensor type=\"perspective\"><float name=\"fov\" value=\"60\"/></sensor>";
@@ -117,7 +117,7 @@ fn spectra_can_be_files() {
     let spd = "# nm value\n400 0.1\n500 0.2 # more\n\n600 0.7\n700 0.9\n";
     let scene = load_files(&[("main.xml", &text), ("s.spd", spd)]).scene;
     let Bsdf::Diffuse(paint) = &scene.bsdfs()[0] else { panic!("{:?}", scene.bsdfs()) };
-    close(paint.reflectance.at(&Spot::default()).to_rgb(), [0.856_079, 0.404_085, 0.112_402]);
+    close(paint.reflectance.at(&Site::default()).to_rgb(), [0.856_079, 0.404_085, 0.112_402]);
 }
 
 /// Directions to the top left and to the bottom right corner.

@@ -6,7 +6,7 @@ use super::lobes::{choose, guess, letter, mean, mirrored, share, unchoose};
 use super::{Bsdf, Evaluation, Letter, RoughCoat, Scatter, fresnel};
 use crate::math::{Row, Walk};
 use crate::spectrum::Spectrum;
-use crate::texture::{Colour, Spot};
+use crate::texture::{Colour, Site};
 use glam::DVec3;
 
 /// Reflects at the layer, and scatters as `nested` below it, on the side of the normal.
@@ -38,7 +38,7 @@ struct Entry {
 
 impl Coating {
     #[inline]
-    fn enter(&self, spot: &Spot, w: DVec3) -> Entry {
+    fn enter(&self, site: &Site, w: DVec3) -> Entry {
         let (reflectance, cos) = fresnel::dielectric(w.z, self.eta);
         // Below an outside of higher index there is total reflection.
         let cos = cos.unwrap_or(0.0);
@@ -48,7 +48,7 @@ impl Coating {
         Entry {
             inside: DVec3::new(w.x / self.eta, w.y / self.eta, cos),
             pass,
-            layer: share((1.0 - pass) * mean(self.specular_reflectance.at(spot)), pass * below),
+            layer: share((1.0 - pass) * mean(self.specular_reflectance.at(site)), pass * below),
             squeeze: if cos > 0.0 { w.z / (self.eta * self.eta * cos) } else { 0.0 },
         }
     }
@@ -61,17 +61,17 @@ impl Coating {
     }
 
     /// Layer and base with their shares of the density.
-    fn parts(&self, spot: &Spot, wi: DVec3, wo: DVec3, walk: Walk) -> [Option<Evaluation>; 2] {
+    fn parts(&self, site: &Site, wi: DVec3, wo: DVec3, walk: Walk) -> [Option<Evaluation>; 2] {
         if wi.z <= 0.0 || wo.z <= 0.0 {
             return [None, None];
         }
-        let (i, o) = (self.enter(spot, wi), self.enter(spot, wo));
+        let (i, o) = (self.enter(site, wi), self.enter(site, wo));
         let layer = self
             .rough
             .as_ref()
-            .map(|rough| rough.evaluate(wi, wo).scaled(self.specular_reflectance.at(spot), i.layer, o.layer));
+            .map(|rough| rough.evaluate(wi, wo).scaled(self.specular_reflectance.at(site), i.layer, o.layer));
         let base =
-            (i.pass > 0.0 && o.pass > 0.0).then(|| self.nested.evaluate(spot, i.inside, o.inside, walk)).flatten();
+            (i.pass > 0.0 && o.pass > 0.0).then(|| self.nested.evaluate(site, i.inside, o.inside, walk)).flatten();
         let base = base.map(|base| {
             // Radiance is squeezed by η² on the way in; cosines and solid angles outside are other ones.
             let factor = self.absorption(&i, &o) * (i.pass * o.pass / (self.eta * self.eta));
@@ -80,8 +80,8 @@ impl Coating {
         [layer, base]
     }
 
-    pub(super) fn evaluate(&self, spot: &Spot, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
-        match self.parts(spot, wi, wo, walk) {
+    pub(super) fn evaluate(&self, site: &Site, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
+        match self.parts(site, wi, wo, walk) {
             [Some(layer), Some(base)] if layer.letter == base.letter => Some(layer.sum(base)),
             [Some(layer), Some(base)] => {
                 let s_like =
@@ -92,28 +92,28 @@ impl Coating {
         }
     }
 
-    pub(super) fn sample(&self, spot: &Spot, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
+    pub(super) fn sample(&self, site: &Site, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
         if wi.z <= 0.0 {
             return None;
         }
-        let i = self.enter(spot, wi);
+        let i = self.enter(site, wi);
         let (is_layer, rest) = choose(row[0], i.layer);
         let direction = match &self.rough {
             None if is_layer => {
-                let weight = self.specular_reflectance.at(spot) * ((1.0 - i.pass) / i.layer);
+                let weight = self.specular_reflectance.at(site) * ((1.0 - i.pass) / i.layer);
                 return Some(Scatter::delta(mirrored(wi), weight, i.layer, i.layer));
             }
             Some(rough) if is_layer => rough.sample(wi, [row[1], row[2]]),
             _ => {
-                let scatter = self.nested.sample(spot, i.inside, [rest, row[1], row[2], row[3]], walk)?;
+                let scatter = self.nested.sample(site, i.inside, [rest, row[1], row[2], row[3]], walk)?;
                 let direction = self.leave(scatter.direction)?;
                 if scatter.delta {
-                    return Some(self.leave_by_delta(spot, &i, scatter, direction));
+                    return Some(self.leave_by_delta(site, &i, scatter, direction));
                 }
                 direction
             }
         };
-        Scatter::of(direction, &self.evaluate(spot, wi, direction, walk)?, 1.0)
+        Scatter::of(direction, &self.evaluate(site, wi, direction, walk)?, 1.0)
     }
 
     /// The direction outside; `None` for total reflection, after which the light is lost.
@@ -124,18 +124,18 @@ impl Coating {
 
     /// A delta lobe of the base. Jacobians of the ways in and out are those of the directions' cosines, which cancel in
     /// the value.
-    fn leave_by_delta(&self, spot: &Spot, i: &Entry, scatter: Scatter, direction: DVec3) -> Scatter {
-        let o = self.enter(spot, direction);
+    fn leave_by_delta(&self, site: &Site, i: &Entry, scatter: Scatter, direction: DVec3) -> Scatter {
+        let o = self.enter(site, direction);
         let weight = scatter.weight * self.absorption(i, &o) * (i.pass * o.pass / (1.0 - i.layer));
         let turned = if i.squeeze > 0.0 { i.squeeze / o.squeeze } else { 1.0 };
         Scatter { direction, weight, ..scatter.chosen(1.0 - i.layer, (1.0 - o.layer) * turned) }
     }
 
-    pub(super) fn invert(&self, spot: &Spot, wi: DVec3, wo: DVec3, delta: bool, gamma: Row) -> Option<Row> {
+    pub(super) fn invert(&self, site: &Site, wi: DVec3, wo: DVec3, delta: bool, gamma: Row) -> Option<Row> {
         if wi.z <= 0.0 || wo.z <= 0.0 {
             return None;
         }
-        let (i, o) = (self.enter(spot, wi), self.enter(spot, wo));
+        let (i, o) = (self.enter(site, wi), self.enter(site, wo));
         let layer = if delta {
             let below = self.nested.has_delta(i.inside) && i.layer < 1.0;
             if self.rough.is_some() {
@@ -147,7 +147,7 @@ impl Coating {
             }
         } else {
             let [layer, base] =
-                self.parts(spot, wi, wo, Walk::FromCamera).map(|part| part.map_or(0.0, |part| part.pdf.0));
+                self.parts(site, wi, wo, Walk::FromCamera).map(|part| part.map_or(0.0, |part| part.pdf.0));
             if layer + base <= 0.0 {
                 return None;
             }
@@ -160,7 +160,7 @@ impl Coating {
                 let [u, v] = rough.invert(wi, wo);
                 [rest, u, v, gamma[3]]
             }
-            _ => self.nested.invert(spot, i.inside, o.inside, delta, [rest, gamma[1], gamma[2], gamma[3]])?,
+            _ => self.nested.invert(site, i.inside, o.inside, delta, [rest, gamma[1], gamma[2], gamma[3]])?,
         };
         Some([unchoose((is_layer, lobe), i.layer), u, v, w])
     }

@@ -4,7 +4,7 @@ use super::lobes::mirrored;
 use super::{Scatter, fresnel};
 use crate::math::Row;
 use crate::spectrum::Spectrum;
-use crate::texture::{Colour, Spot};
+use crate::texture::{Colour, Site};
 use glam::DVec3;
 
 /// A smooth metal.
@@ -19,8 +19,8 @@ pub struct Conductor {
 impl Conductor {
     /// Reflected share at the positive cosine `cos_i`.
     #[inline]
-    pub(super) fn reflectance(&self, spot: &Spot, cos_i: f64) -> Spectrum {
-        let factor = self.specular_reflectance.at(spot);
+    pub(super) fn reflectance(&self, site: &Site, cos_i: f64) -> Spectrum {
+        let factor = self.specular_reflectance.at(site);
         match self.index {
             Some((eta, k)) => fresnel::conductor(cos_i, eta, k) * factor,
             None => factor,
@@ -28,8 +28,8 @@ impl Conductor {
     }
 
     #[inline]
-    pub(super) fn sample(&self, spot: &Spot, wi: DVec3) -> Option<Scatter> {
-        (wi.z > 0.0).then(|| Scatter::delta(mirrored(wi), self.reflectance(spot, wi.z), 1.0, 1.0))
+    pub(super) fn sample(&self, site: &Site, wi: DVec3) -> Option<Scatter> {
+        (wi.z > 0.0).then(|| Scatter::delta(mirrored(wi), self.reflectance(site, wi.z), 1.0, 1.0))
     }
 
     pub(super) fn invert(&self, wi: DVec3, wo: DVec3, gamma: Row) -> Option<Row> {

@@ -2,7 +2,7 @@
 
 use super::{Evaluation, Letter, Scatter};
 use crate::math::{Row, warp::hemisphere};
-use crate::texture::{Colour, Spot};
+use crate::texture::{Colour, Site};
 use glam::DVec3;
 use std::f64::consts::FRAC_1_PI;
 
@@ -15,9 +15,9 @@ pub struct Diffuse {
 
 impl Diffuse {
     #[inline]
-    pub(super) fn evaluate(&self, spot: &Spot, wi: DVec3, wo: DVec3) -> Option<Evaluation> {
+    pub(super) fn evaluate(&self, site: &Site, wi: DVec3, wo: DVec3) -> Option<Evaluation> {
         (wi.z > 0.0 && wo.z > 0.0).then(|| Evaluation {
-            value: self.reflectance.at(spot) * FRAC_1_PI,
+            value: self.reflectance.at(site) * FRAC_1_PI,
             pdf: hemisphere::pdf(wo),
             pdf_reverse: hemisphere::pdf(wi),
             letter: Letter::D,
@@ -25,11 +25,11 @@ impl Diffuse {
     }
 
     #[inline]
-    pub(super) fn sample(&self, spot: &Spot, wi: DVec3, row: Row) -> Option<Scatter> {
+    pub(super) fn sample(&self, site: &Site, wi: DVec3, row: Row) -> Option<Scatter> {
         let direction = hemisphere::sample([row[1], row[2]]);
         (wi.z > 0.0 && direction.z > 0.0).then(|| Scatter {
             direction,
-            weight: self.reflectance.at(spot),
+            weight: self.reflectance.at(site),
             pdf: hemisphere::pdf(direction),
             pdf_reverse: hemisphere::pdf(wi),
             delta: false,

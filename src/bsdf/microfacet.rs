@@ -4,7 +4,7 @@
 use super::slopes::Slopes;
 use super::{GLOSSY_ALPHA, Letter};
 use crate::math::warp::disk;
-use crate::texture::{Number, Spot};
+use crate::texture::{Number, Site};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_1_PI, TAU};
 
@@ -39,12 +39,12 @@ impl Roughness {
         Self { distribution, alpha_u: alpha.into(), alpha_v: alpha.into(), visible: true }
     }
 
-    /// The distribution at `spot`.
+    /// The distribution at `site`.
     #[inline]
-    pub fn at(&self, spot: &Spot) -> Microfacet {
+    pub fn at(&self, site: &Site) -> Microfacet {
         Microfacet {
             distribution: self.distribution,
-            alpha: DVec2::new(self.alpha_u.at(spot), self.alpha_v.at(spot)).max(DVec2::splat(SMALLEST_ALPHA)),
+            alpha: DVec2::new(self.alpha_u.at(site), self.alpha_v.at(site)).max(DVec2::splat(SMALLEST_ALPHA)),
             visible: self.visible,
         }
     }
@@ -62,7 +62,7 @@ impl Roughness {
     /// Whether photons are gathered: where the letter is `D`, and wherever it varies.
     #[inline]
     pub fn gathers(&self) -> bool {
-        !self.is_constant() || self.at(&Spot::default()).letter() == Letter::D
+        !self.is_constant() || self.at(&Site::default()).letter() == Letter::D
     }
 }
 

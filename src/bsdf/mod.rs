@@ -1,5 +1,5 @@
 //! Scattering at surfaces. Directions are unit vectors in the shading frame (normal = +z) and point away from the
-//! surface: `wi` back to the previous vertex of the walk, `wo` on to the next. `spot` is where textures are looked up.
+//! surface: `wi` back to the previous vertex of the walk, `wo` on to the next. `site` is where textures are looked up.
 //!
 //! A model may have delta lobes beside others. [`Bsdf::evaluate`] knows of the others only; [`Bsdf::sample`] chooses
 //! among all, and says of what kind its choice was.
@@ -47,7 +47,7 @@ pub use thin_dielectric::ThinDielectric;
 
 use crate::math::{Row, SolidAnglePdf, Walk};
 use crate::spectrum::Spectrum;
-use crate::texture::Spot;
+use crate::texture::Site;
 use glam::DVec3;
 
 /// The letter that a vertex has in Heckbert's notation, for one pair of directions.
@@ -150,63 +150,63 @@ fn pass(wi: DVec3) -> Scatter {
 impl Bsdf {
     /// Value, densities and letter for a pair of directions; `None` where the value is zero, always so for delta lobes.
     #[inline]
-    pub fn evaluate(&self, spot: &Spot, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
+    pub fn evaluate(&self, site: &Site, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
         // The most frequent model needs no call; nested models make one of the rest.
         match self {
-            Self::Diffuse(diffuse) => diffuse.evaluate(spot, wi, wo),
-            _ => self.evaluate_any(spot, wi, wo, walk),
+            Self::Diffuse(diffuse) => diffuse.evaluate(site, wi, wo),
+            _ => self.evaluate_any(site, wi, wo, walk),
         }
     }
 
-    fn evaluate_any(&self, spot: &Spot, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
+    fn evaluate_any(&self, site: &Site, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
         match self {
-            Self::Diffuse(diffuse) => diffuse.evaluate(spot, wi, wo),
-            Self::RoughConductor(rough) => rough.evaluate(spot, wi, wo),
-            Self::RoughDielectric(rough) => rough.evaluate(spot, wi, wo, walk),
+            Self::Diffuse(diffuse) => diffuse.evaluate(site, wi, wo),
+            Self::RoughConductor(rough) => rough.evaluate(site, wi, wo),
+            Self::RoughDielectric(rough) => rough.evaluate(site, wi, wo, walk),
             Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) | Self::Null => None,
-            Self::Plastic(plastic) => plastic.evaluate(spot, wi, wo),
-            Self::RoughPlastic(plastic) => plastic.evaluate(spot, wi, wo),
-            Self::Phong(phong) => phong.evaluate(spot, wi, wo),
-            Self::Principled(principled) => principled.evaluate(spot, wi, wo, walk),
-            Self::Coating(coating) => coating.evaluate(spot, wi, wo, walk),
-            Self::Mask(mask) => mask.evaluate(spot, wi, wo, walk),
-            Self::Blend(blend) => blend.evaluate(spot, wi, wo, walk),
-            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].evaluate(spot, wi, wo, walk),
-            Self::TwoSided(sides) => sides[1].evaluate(spot, flip(wi), flip(wo), walk),
-            Self::Turned(bsdf) => bsdf.evaluate(spot, flip(wi), flip(wo), walk),
+            Self::Plastic(plastic) => plastic.evaluate(site, wi, wo),
+            Self::RoughPlastic(plastic) => plastic.evaluate(site, wi, wo),
+            Self::Phong(phong) => phong.evaluate(site, wi, wo),
+            Self::Principled(principled) => principled.evaluate(site, wi, wo, walk),
+            Self::Coating(coating) => coating.evaluate(site, wi, wo, walk),
+            Self::Mask(mask) => mask.evaluate(site, wi, wo, walk),
+            Self::Blend(blend) => blend.evaluate(site, wi, wo, walk),
+            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].evaluate(site, wi, wo, walk),
+            Self::TwoSided(sides) => sides[1].evaluate(site, flip(wi), flip(wo), walk),
+            Self::Turned(bsdf) => bsdf.evaluate(site, flip(wi), flip(wo), walk),
         }
     }
 
     /// Samples a direction from the first three numbers of `row`; `None` where light is absorbed.
     #[inline]
-    pub fn sample(&self, spot: &Spot, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
+    pub fn sample(&self, site: &Site, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
         match self {
-            Self::Diffuse(diffuse) => diffuse.sample(spot, wi, row),
-            _ => self.sample_any(spot, wi, row, walk),
+            Self::Diffuse(diffuse) => diffuse.sample(site, wi, row),
+            _ => self.sample_any(site, wi, row, walk),
         }
     }
 
-    fn sample_any(&self, spot: &Spot, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
+    fn sample_any(&self, site: &Site, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
         let turned = |bsdf: &Self| {
-            let scatter = bsdf.sample(spot, flip(wi), row, walk)?;
+            let scatter = bsdf.sample(site, flip(wi), row, walk)?;
             Some(Scatter { direction: flip(scatter.direction), ..scatter })
         };
         match self {
-            Self::Diffuse(diffuse) => diffuse.sample(spot, wi, row),
-            Self::RoughConductor(rough) => rough.sample(spot, wi, row),
-            Self::RoughDielectric(rough) => rough.sample(spot, wi, row, walk),
-            Self::Conductor(conductor) => conductor.sample(spot, wi),
+            Self::Diffuse(diffuse) => diffuse.sample(site, wi, row),
+            Self::RoughConductor(rough) => rough.sample(site, wi, row),
+            Self::RoughDielectric(rough) => rough.sample(site, wi, row, walk),
+            Self::Conductor(conductor) => conductor.sample(site, wi),
             Self::Dielectric(dielectric) => dielectric.sample(wi, row, walk),
             Self::ThinDielectric(pane) => pane.sample(wi, row),
             Self::Null => Some(pass(wi)),
-            Self::Plastic(plastic) => plastic.sample(spot, wi, row),
-            Self::RoughPlastic(plastic) => plastic.sample(spot, wi, row),
-            Self::Phong(phong) => phong.sample(spot, wi, row),
-            Self::Principled(principled) => principled.sample(spot, wi, row, walk),
-            Self::Coating(coating) => coating.sample(spot, wi, row, walk),
-            Self::Mask(mask) => mask.sample(spot, wi, row, walk),
-            Self::Blend(blend) => blend.sample(spot, wi, row, walk),
-            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].sample(spot, wi, row, walk),
+            Self::Plastic(plastic) => plastic.sample(site, wi, row),
+            Self::RoughPlastic(plastic) => plastic.sample(site, wi, row),
+            Self::Phong(phong) => phong.sample(site, wi, row),
+            Self::Principled(principled) => principled.sample(site, wi, row, walk),
+            Self::Coating(coating) => coating.sample(site, wi, row, walk),
+            Self::Mask(mask) => mask.sample(site, wi, row, walk),
+            Self::Blend(blend) => blend.sample(site, wi, row, walk),
+            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].sample(site, wi, row, walk),
             Self::TwoSided(sides) => turned(&sides[1]),
             Self::Turned(bsdf) => turned(bsdf),
         }
@@ -215,28 +215,28 @@ impl Bsdf {
     /// A row that [`Bsdf::sample`] takes from `wi` to `wo`; numbers that the sampling leaves open are taken from
     /// `gamma`, and so is the lobe where several lead to `wo`. `delta` says whether a delta lobe is to be chosen, which
     /// the directions alone do not. `None` where `wo` cannot be sampled so.
-    pub fn invert(&self, spot: &Spot, wi: DVec3, wo: DVec3, delta: bool, gamma: Row) -> Option<Row> {
+    pub fn invert(&self, site: &Site, wi: DVec3, wo: DVec3, delta: bool, gamma: Row) -> Option<Row> {
         if if delta { !self.has_delta(wi) } else { self.is_delta(wi) } {
             return None;
         }
         match self {
             Self::Diffuse(diffuse) => diffuse.invert(wi, wo, gamma),
-            Self::RoughConductor(rough) => rough.invert(spot, wi, wo, gamma),
-            Self::RoughDielectric(rough) => rough.invert(spot, wi, wo, gamma),
+            Self::RoughConductor(rough) => rough.invert(site, wi, wo, gamma),
+            Self::RoughDielectric(rough) => rough.invert(site, wi, wo, gamma),
             Self::Conductor(conductor) => conductor.invert(wi, wo, gamma),
             Self::Dielectric(dielectric) => dielectric.invert(wi, wo, gamma),
             Self::ThinDielectric(pane) => pane.invert(wi, wo, gamma),
             Self::Null => (wi.z * wo.z < 0.0).then_some(gamma),
-            Self::Plastic(plastic) => plastic.invert(spot, wi, wo, delta, gamma),
-            Self::RoughPlastic(plastic) => plastic.invert(spot, wi, wo, gamma),
-            Self::Phong(phong) => phong.invert(spot, wi, wo, gamma),
-            Self::Principled(principled) => principled.invert(spot, wi, wo, gamma),
-            Self::Coating(coating) => coating.invert(spot, wi, wo, delta, gamma),
-            Self::Mask(mask) => mask.invert(spot, wi, wo, delta, gamma),
-            Self::Blend(blend) => blend.invert(spot, wi, wo, delta, gamma),
-            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].invert(spot, wi, wo, delta, gamma),
-            Self::TwoSided(sides) => sides[1].invert(spot, flip(wi), flip(wo), delta, gamma),
-            Self::Turned(bsdf) => bsdf.invert(spot, flip(wi), flip(wo), delta, gamma),
+            Self::Plastic(plastic) => plastic.invert(site, wi, wo, delta, gamma),
+            Self::RoughPlastic(plastic) => plastic.invert(site, wi, wo, gamma),
+            Self::Phong(phong) => phong.invert(site, wi, wo, gamma),
+            Self::Principled(principled) => principled.invert(site, wi, wo, gamma),
+            Self::Coating(coating) => coating.invert(site, wi, wo, delta, gamma),
+            Self::Mask(mask) => mask.invert(site, wi, wo, delta, gamma),
+            Self::Blend(blend) => blend.invert(site, wi, wo, delta, gamma),
+            Self::TwoSided(sides) if wi.z >= 0.0 => sides[0].invert(site, wi, wo, delta, gamma),
+            Self::TwoSided(sides) => sides[1].invert(site, flip(wi), flip(wo), delta, gamma),
+            Self::Turned(bsdf) => bsdf.invert(site, flip(wi), flip(wo), delta, gamma),
         }
     }
 }

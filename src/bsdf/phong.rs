@@ -4,7 +4,7 @@
 use super::lobes::{choose, guess, letter, mean, mirrored, share, unchoose};
 use super::{Evaluation, GLOSSY_ALPHA, Letter, Scatter};
 use crate::math::{Frame, Row, SolidAnglePdf, warp::hemisphere};
-use crate::texture::{Colour, Number, Spot};
+use crate::texture::{Colour, Number, Site};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_1_PI, TAU};
 
@@ -21,8 +21,8 @@ pub struct Phong {
 
 impl Phong {
     #[inline]
-    fn exponent(&self, spot: &Spot) -> f64 {
-        self.exponent.at(spot).max(0.0)
+    fn exponent(&self, site: &Site) -> f64 {
+        self.exponent.at(site).max(0.0)
     }
 
     /// The letter of the lobe, by the roughness of a Beckmann surface with a highlight of the same width: n = 2/α² − 2
@@ -34,8 +34,8 @@ impl Phong {
 
     /// Probability of the lobe around the mirror direction, the same for all directions.
     #[inline]
-    fn glossy(&self, spot: &Spot) -> f64 {
-        share(mean(self.specular_reflectance.at(spot)), mean(self.diffuse_reflectance.at(spot)))
+    fn glossy(&self, site: &Site) -> f64 {
+        share(mean(self.specular_reflectance.at(site)), mean(self.diffuse_reflectance.at(site)))
     }
 
     /// Density of the lobe around the mirror direction, symmetric.
@@ -45,15 +45,15 @@ impl Phong {
     }
 
     #[inline]
-    pub(super) fn evaluate(&self, spot: &Spot, wi: DVec3, wo: DVec3) -> Option<Evaluation> {
+    pub(super) fn evaluate(&self, site: &Site, wi: DVec3, wo: DVec3) -> Option<Evaluation> {
         if wi.z <= 0.0 || wo.z <= 0.0 {
             return None;
         }
-        let (exponent, glossy) = (self.exponent(spot), self.glossy(spot));
+        let (exponent, glossy) = (self.exponent(site), self.glossy(site));
         let lobe = Self::lobe_pdf(exponent, wi, wo);
         // Lafortune and Willems 1994, eq. 8: at normal incidence (n + 2) / 2π loses no energy.
-        let specular = self.specular_reflectance.at(spot) * (lobe * (exponent + 2.0) / (exponent + 1.0));
-        let diffuse = self.diffuse_reflectance.at(spot) * FRAC_1_PI;
+        let specular = self.specular_reflectance.at(site) * (lobe * (exponent + 2.0) / (exponent + 1.0));
+        let diffuse = self.diffuse_reflectance.at(site) * FRAC_1_PI;
         let pdf = |cosine: SolidAnglePdf| SolidAnglePdf(glossy * lobe + (1.0 - glossy) * cosine.0);
         Some(Evaluation {
             value: specular + diffuse,
@@ -64,25 +64,25 @@ impl Phong {
     }
 
     #[inline]
-    pub(super) fn sample(&self, spot: &Spot, wi: DVec3, row: Row) -> Option<Scatter> {
+    pub(super) fn sample(&self, site: &Site, wi: DVec3, row: Row) -> Option<Scatter> {
         if wi.z <= 0.0 {
             return None;
         }
-        let direction = if choose(row[0], self.glossy(spot)).0 {
-            let cos = (1.0 - row[1]).powf(1.0 / (self.exponent(spot) + 1.0));
+        let direction = if choose(row[0], self.glossy(site)).0 {
+            let cos = (1.0 - row[1]).powf(1.0 / (self.exponent(site) + 1.0));
             let around = DVec2::from_angle(TAU * row[2]) * (1.0 - cos * cos).max(0.0).sqrt();
             Frame::around(mirrored(wi)).to_world(around.extend(cos))
         } else {
             hemisphere::sample([row[1], row[2]])
         };
-        Scatter::of(direction, &self.evaluate(spot, wi, direction)?, 1.0)
+        Scatter::of(direction, &self.evaluate(site, wi, direction)?, 1.0)
     }
 
-    pub(super) fn invert(&self, spot: &Spot, wi: DVec3, wo: DVec3, gamma: Row) -> Option<Row> {
+    pub(super) fn invert(&self, site: &Site, wi: DVec3, wo: DVec3, gamma: Row) -> Option<Row> {
         if wi.z <= 0.0 || wo.z <= 0.0 {
             return None;
         }
-        let (exponent, glossy) = (self.exponent(spot), self.glossy(spot));
+        let (exponent, glossy) = (self.exponent(site), self.glossy(site));
         let lobe = glossy * Self::lobe_pdf(exponent, wi, wo);
         let (is_lobe, rest) = guess(gamma[0], lobe, (1.0 - glossy) * hemisphere::pdf(wo).0);
         let [u, v] = if is_lobe {

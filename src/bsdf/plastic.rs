@@ -3,7 +3,7 @@
 use super::lobes::{mean, mirrored, share, unchoose};
 use super::{Evaluation, Letter, Scatter, Substrate, fresnel};
 use crate::math::{Row, warp::hemisphere};
-use crate::texture::{Colour, Spot};
+use crate::texture::{Colour, Site};
 use glam::DVec3;
 
 /// Reflects at the coat as a mirror, and diffusely at the base, on the side of the normal.
@@ -24,20 +24,20 @@ impl Plastic {
 
     /// Reflectance of the coat for `w`, and the probability of choosing it.
     #[inline]
-    fn coat(&self, spot: &Spot, w: DVec3) -> (f64, f64) {
+    fn coat(&self, site: &Site, w: DVec3) -> (f64, f64) {
         let (reflectance, _) = fresnel::dielectric(w.z, self.base.eta);
-        let specular = reflectance * mean(self.specular_reflectance.at(spot));
-        (reflectance, share(specular, (1.0 - reflectance) * mean(self.base.reflectance.at(spot))))
+        let specular = reflectance * mean(self.specular_reflectance.at(site));
+        (reflectance, share(specular, (1.0 - reflectance) * mean(self.base.reflectance.at(site))))
     }
 
     #[inline]
-    pub(super) fn evaluate(&self, spot: &Spot, wi: DVec3, wo: DVec3) -> Option<Evaluation> {
+    pub(super) fn evaluate(&self, site: &Site, wi: DVec3, wo: DVec3) -> Option<Evaluation> {
         if wi.z <= 0.0 || wo.z <= 0.0 {
             return None;
         }
-        let ((reflectance_i, coat_i), (reflectance_o, coat_o)) = (self.coat(spot, wi), self.coat(spot, wo));
+        let ((reflectance_i, coat_i), (reflectance_o, coat_o)) = (self.coat(site, wi), self.coat(site, wo));
         let evaluation = Evaluation {
-            value: self.base.value(spot, 1.0 - reflectance_i, 1.0 - reflectance_o),
+            value: self.base.value(site, 1.0 - reflectance_i, 1.0 - reflectance_o),
             pdf: hemisphere::pdf(wo),
             pdf_reverse: hemisphere::pdf(wi),
             letter: Letter::D,
@@ -46,24 +46,24 @@ impl Plastic {
     }
 
     #[inline]
-    pub(super) fn sample(&self, spot: &Spot, wi: DVec3, row: Row) -> Option<Scatter> {
+    pub(super) fn sample(&self, site: &Site, wi: DVec3, row: Row) -> Option<Scatter> {
         if wi.z <= 0.0 {
             return None;
         }
-        let (reflectance, coat) = self.coat(spot, wi);
+        let (reflectance, coat) = self.coat(site, wi);
         if row[0] < coat {
-            let weight = self.specular_reflectance.at(spot) * (reflectance / coat);
+            let weight = self.specular_reflectance.at(site) * (reflectance / coat);
             return Some(Scatter::delta(mirrored(wi), weight, coat, coat));
         }
         let direction = hemisphere::sample([row[1], row[2]]);
-        Scatter::of(direction, &self.evaluate(spot, wi, direction)?, 1.0)
+        Scatter::of(direction, &self.evaluate(site, wi, direction)?, 1.0)
     }
 
-    pub(super) fn invert(&self, spot: &Spot, wi: DVec3, wo: DVec3, delta: bool, gamma: Row) -> Option<Row> {
+    pub(super) fn invert(&self, site: &Site, wi: DVec3, wo: DVec3, delta: bool, gamma: Row) -> Option<Row> {
         if wi.z <= 0.0 || wo.z <= 0.0 {
             return None;
         }
-        let (_, coat) = self.coat(spot, wi);
+        let (_, coat) = self.coat(site, wi);
         let lobe = unchoose((delta, gamma[0]), coat);
         let [u, v] = if delta { [gamma[1], gamma[2]] } else { hemisphere::invert(wo) };
         (coat != f64::from(u8::from(!delta))).then_some([lobe, u, v, gamma[3]])

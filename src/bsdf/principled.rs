@@ -8,7 +8,7 @@ mod local;
 use super::lobes::{choose, guess, unchoose};
 use super::{Evaluation, Letter, Scatter};
 use crate::math::{Row, Walk, warp::hemisphere};
-use crate::texture::{Colour, Number, Spot};
+use crate::texture::{Colour, Number, Site};
 use clearcoat::Clearcoat;
 use glam::DVec3;
 use local::{Local, Pair};
@@ -72,19 +72,19 @@ impl Principled {
     /// Whether photons are gathered: unless the rough lobes are all there is, and glossy.
     #[inline]
     pub(super) fn gathers(&self) -> bool {
-        let local = Local::of(self, &Spot::default());
+        let local = Local::of(self, &Site::default());
         !self.is_constant() || local.diffuse() > 0.0 || local.microfacet.letter() == Letter::D
     }
 
-    pub(super) fn evaluate(&self, spot: &Spot, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
-        let local = Local::of(self, spot);
+    pub(super) fn evaluate(&self, site: &Site, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
+        let local = Local::of(self, site);
         let pair = Pair::of(&local, wi, wo)?;
         let evaluation = local.evaluate(&pair, walk);
         (evaluation.pdf.0 > 0.0).then_some(evaluation)
     }
 
-    pub(super) fn sample(&self, spot: &Spot, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
-        let local = Local::of(self, spot);
+    pub(super) fn sample(&self, site: &Site, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
+        let local = Local::of(self, site);
         let u = [row[1], row[2]];
         let (main, coat) = local.probabilities(wi);
         let (is_main, rest) = choose(row[0], main);
@@ -100,11 +100,11 @@ impl Principled {
             return None;
         }
         let eta = if wi.z * direction.z > 0.0 { 1.0 } else { local.relative_eta(wi) };
-        Scatter::of(direction, &self.evaluate(spot, wi, direction, walk)?, eta)
+        Scatter::of(direction, &self.evaluate(site, wi, direction, walk)?, eta)
     }
 
-    pub(super) fn invert(&self, spot: &Spot, wi: DVec3, wo: DVec3, gamma: Row) -> Option<Row> {
-        let local = Local::of(self, spot);
+    pub(super) fn invert(&self, site: &Site, wi: DVec3, wo: DVec3, gamma: Row) -> Option<Row> {
+        let local = Local::of(self, site);
         let pair = Pair::of(&local, wi, wo)?;
         let (main, coat) = local.probabilities(wi);
         let [main_pdf, coat_pdf, base_pdf] = local.densities(&pair);

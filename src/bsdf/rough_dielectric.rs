@@ -4,7 +4,7 @@
 use super::{Evaluation, Microfacet, Roughness, Scatter, flip, fresnel, lobes};
 use crate::math::{Row, SolidAnglePdf, Walk};
 use crate::spectrum::Spectrum;
-use crate::texture::Spot;
+use crate::texture::Site;
 use glam::DVec3;
 
 /// Reflects and refracts; the normal points to the outside.
@@ -48,8 +48,8 @@ impl RoughDielectric {
         faces.then_some(Seen { wi, wo, eta, h })
     }
 
-    pub(super) fn evaluate(&self, spot: &Spot, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
-        let microfacet = self.roughness.at(spot);
+    pub(super) fn evaluate(&self, site: &Site, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
+        let microfacet = self.roughness.at(site);
         let seen = self.see(wi, wo)?;
         let (reflectance, _) = fresnel::dielectric(seen.wi.dot(seen.h), seen.eta);
         let evaluation = if seen.wo.z > 0.0 {
@@ -94,12 +94,12 @@ impl RoughDielectric {
         }
     }
 
-    pub(super) fn sample(&self, spot: &Spot, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
+    pub(super) fn sample(&self, site: &Site, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
         if wi.z == 0.0 {
             return None;
         }
         let upper = if wi.z > 0.0 { wi } else { flip(wi) };
-        let h = self.roughness.at(spot).sample(upper, [row[1], row[2]]);
+        let h = self.roughness.at(site).sample(upper, [row[1], row[2]]);
         let (cos_i, eta) = (upper.dot(h), self.relative_eta(wi));
         if cos_i <= 0.0 {
             return None;
@@ -113,17 +113,17 @@ impl RoughDielectric {
             return None;
         }
         let direction = if wi.z > 0.0 { direction } else { flip(direction) };
-        let evaluation = self.evaluate(spot, wi, direction, walk)?;
+        let evaluation = self.evaluate(site, wi, direction, walk)?;
         Scatter::of(direction, &evaluation, if passed { eta } else { 1.0 })
     }
 
-    pub(super) fn invert(&self, spot: &Spot, wi: DVec3, wo: DVec3, gamma: Row) -> Option<Row> {
+    pub(super) fn invert(&self, site: &Site, wi: DVec3, wo: DVec3, gamma: Row) -> Option<Row> {
         let seen = self.see(wi, wo)?;
         let (reflectance, _) = fresnel::dielectric(seen.wi.dot(seen.h), seen.eta);
         if seen.wo.z < 0.0 && reflectance == 1.0 {
             return None;
         }
-        let [u, v] = self.roughness.at(spot).invert(seen.wi, seen.h);
+        let [u, v] = self.roughness.at(site).invert(seen.wi, seen.h);
         Some([lobes::unchoose((seen.wo.z > 0.0, gamma[0]), reflectance), u, v, gamma[3]])
     }
 }

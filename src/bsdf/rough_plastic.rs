@@ -4,7 +4,7 @@ use super::lobes::{choose, guess, letter, mean, share, unchoose};
 use super::{Evaluation, Letter, RoughCoat, Scatter, Substrate};
 use crate::math::{Row, warp::hemisphere};
 use crate::spectrum::Spectrum;
-use crate::texture::{Colour, Spot};
+use crate::texture::{Colour, Site};
 use glam::DVec3;
 
 /// Reflects at the facets of the coat, and diffusely at the base, on the side of the normal.
@@ -28,51 +28,51 @@ impl RoughPlastic {
 
     /// What the coat lets pass for `w`, and the probability of choosing its reflection.
     #[inline]
-    fn pass(&self, spot: &Spot, w: DVec3) -> (f64, f64) {
+    fn pass(&self, site: &Site, w: DVec3) -> (f64, f64) {
         let pass = self.coat.transmittance(w.z);
-        let specular = (1.0 - pass) * mean(self.specular_reflectance.at(spot));
-        (pass, share(specular, pass * mean(self.base.reflectance.at(spot))))
+        let specular = (1.0 - pass) * mean(self.specular_reflectance.at(site));
+        (pass, share(specular, pass * mean(self.base.reflectance.at(site))))
     }
 
     /// Coat and base with their shares of the density.
     #[inline]
-    fn parts(&self, spot: &Spot, wi: DVec3, wo: DVec3) -> Option<[Evaluation; 2]> {
+    fn parts(&self, site: &Site, wi: DVec3, wo: DVec3) -> Option<[Evaluation; 2]> {
         if wi.z <= 0.0 || wo.z <= 0.0 {
             return None;
         }
-        let ((pass_i, coat_i), (pass_o, coat_o)) = (self.pass(spot, wi), self.pass(spot, wo));
+        let ((pass_i, coat_i), (pass_o, coat_o)) = (self.pass(site, wi), self.pass(site, wo));
         let base = Evaluation {
-            value: self.base.value(spot, pass_i, pass_o),
+            value: self.base.value(site, pass_i, pass_o),
             pdf: hemisphere::pdf(wo),
             pdf_reverse: hemisphere::pdf(wi),
             letter: Letter::D,
         };
-        let coat = self.coat.evaluate(wi, wo).scaled(self.specular_reflectance.at(spot), coat_i, coat_o);
+        let coat = self.coat.evaluate(wi, wo).scaled(self.specular_reflectance.at(site), coat_i, coat_o);
         Some([coat, base.scaled(Spectrum::ONE, 1.0 - coat_i, 1.0 - coat_o)])
     }
 
     #[inline]
-    pub(super) fn evaluate(&self, spot: &Spot, wi: DVec3, wo: DVec3) -> Option<Evaluation> {
-        let [coat, base] = self.parts(spot, wi, wo)?;
+    pub(super) fn evaluate(&self, site: &Site, wi: DVec3, wo: DVec3) -> Option<Evaluation> {
+        let [coat, base] = self.parts(site, wi, wo)?;
         let name = if coat.letter == Letter::D { Letter::D } else { letter(coat.value, base.value) };
         Some(Evaluation { letter: name, ..coat.sum(base) })
     }
 
     #[inline]
-    pub(super) fn sample(&self, spot: &Spot, wi: DVec3, row: Row) -> Option<Scatter> {
+    pub(super) fn sample(&self, site: &Site, wi: DVec3, row: Row) -> Option<Scatter> {
         if wi.z <= 0.0 {
             return None;
         }
         let u = [row[1], row[2]];
-        let coat = choose(row[0], self.pass(spot, wi).1).0;
+        let coat = choose(row[0], self.pass(site, wi).1).0;
         let direction = if coat { self.coat.sample(wi, u) } else { hemisphere::sample(u) };
-        Scatter::of(direction, &self.evaluate(spot, wi, direction)?, 1.0)
+        Scatter::of(direction, &self.evaluate(site, wi, direction)?, 1.0)
     }
 
-    pub(super) fn invert(&self, spot: &Spot, wi: DVec3, wo: DVec3, gamma: Row) -> Option<Row> {
-        let [coat, base] = self.parts(spot, wi, wo)?;
+    pub(super) fn invert(&self, site: &Site, wi: DVec3, wo: DVec3, gamma: Row) -> Option<Row> {
+        let [coat, base] = self.parts(site, wi, wo)?;
         let (is_coat, rest) = guess(gamma[0], coat.pdf.0, base.pdf.0);
         let [u, v] = if is_coat { self.coat.invert(wi, wo) } else { hemisphere::invert(wo) };
-        Some([unchoose((is_coat, rest), self.pass(spot, wi).1), u, v, gamma[3]])
+        Some([unchoose((is_coat, rest), self.pass(site, wi).1), u, v, gamma[3]])
     }
 }

@@ -10,8 +10,8 @@ use crate::math::{Stream, warp};
 use models::{Case, cases};
 
 /// The models of these tests are the same everywhere.
-fn here() -> Spot {
-    Spot::default()
+fn here() -> Site {
+    Site::default()
 }
 
 /// Directions over the whole sphere, but for those along the surface.

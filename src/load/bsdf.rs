@@ -327,7 +327,7 @@ fn reflectances(plugin: &mut Plugin<'_>) -> Result<(Colour, Colour), LoadError> 
 mod tests {
     use super::*;
     use crate::math::{Stream, Walk};
-    use crate::texture::Spot;
+    use crate::texture::Site;
     use glam::DVec3;
 
     /// A turned model does from below what the model does from above.
@@ -342,8 +342,8 @@ mod tests {
             for wi in [DVec3::new(0.6, 0.0, 0.8), DVec3::new(0.0, 0.28, -0.96)] {
                 let row = stream.row();
                 let mirrored = |w: DVec3| DVec3::new(w.x, w.y, -w.z);
-                let here = bsdf.sample(&Spot::default(), wi, row, Walk::FromCamera);
-                let there = other.sample(&Spot::default(), mirrored(wi), row, Walk::FromCamera);
+                let here = bsdf.sample(&Site::default(), wi, row, Walk::FromCamera);
+                let there = other.sample(&Site::default(), mirrored(wi), row, Walk::FromCamera);
                 let seen = here.map(|s| (s.direction, s.weight));
                 let expected = there.filter(|s| !s.weight.is_black()).map(|s| (mirrored(s.direction), s.weight));
                 assert_eq!(seen.is_some(), expected.is_some(), "{bsdf:?} {wi}");

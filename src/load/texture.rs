@@ -172,7 +172,7 @@ mod tests {
     use super::super::document::with_root;
     use super::*;
     use crate::image::{Image, WriteOptions};
-    use crate::texture::Spot;
+    use crate::texture::Site;
     use ::image::{Rgb, RgbImage};
     use std::path::Path;
 
@@ -243,8 +243,8 @@ mod tests {
         let read = |parameter: &str| colour(folder.path(), parameter);
         let board = read("<ref name=\"reflectance\" id=\"board\"/>").unwrap();
         assert_eq!(board.at(&DVec2::splat(0.1).into()).to_rgb(), [0.4; 3]);
-        assert_eq!(read("<rgb name=\"reflectance\" value=\"0.1\"/>").unwrap().at(&Spot::default()).to_rgb(), [0.1; 3]);
-        assert_eq!(read("").unwrap().at(&Spot::default()).to_rgb(), [0.5; 3]);
+        assert_eq!(read("<rgb name=\"reflectance\" value=\"0.1\"/>").unwrap().at(&Site::default()).to_rgb(), [0.1; 3]);
+        assert_eq!(read("").unwrap().at(&Site::default()).to_rgb(), [0.5; 3]);
         assert!(read("<rgb name=\"reflectance\" value=\"2\"/>").is_err());
     }
 

@@ -43,7 +43,7 @@ fn see_light(scene: &Caster<'_>, camera: &[Vertex], techniques: &Techniques) -> 
         VertexKind::Environment(id) => (*id, Start::Infinite { towards: -end.back }),
         VertexKind::Surface(surface) => (
             surface.emitter?,
-            Start::Surface { position: end.position, normal: surface.geometric, uv: surface.spot.uv },
+            Start::Surface { position: end.position, normal: surface.geometric, uv: surface.site.uv },
         ),
         _ => return None,
     };

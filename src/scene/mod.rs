@@ -15,7 +15,7 @@ use crate::camera::Camera;
 use crate::emitter::{Emitter, LightTree, Start};
 use crate::geometry::{Bvh, NO_TRIANGLE, Primitive, Ray, Solid, SurfacePoint, offset};
 use crate::math::{AreaPdf, Discrete, Frame, Row};
-use crate::texture::{Relief, Spot, attribute};
+use crate::texture::{Relief, Site, attribute};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
 /// Index into the scene's scattering models.
@@ -114,7 +114,7 @@ impl Scene {
         } else {
             normal
         };
-        let (mut spot, mut frame, mut up) = (Spot::default(), Frame::around(shading), DVec3::Z);
+        let (mut site, mut frame, mut up) = (Site::default(), Frame::around(shading), DVec3::Z);
         if textured {
             // Without texture coordinates, barycentric ones stand in, as in Mitsuba.
             let uvs = match mapped {
@@ -126,7 +126,7 @@ impl Scene {
                 Some(first) => attribute::place(index as u32 - first, DVec2::new(u, v)),
                 None => mapped,
             };
-            spot = Spot::new(uv, self.bsdf(bsdf).texture());
+            site = Site::new(uv, self.bsdf(bsdf).texture());
             if oriented {
                 let derivatives = relief::derivatives([a, b, c], uvs, normal);
                 (frame, up) = self.orient(shading, bsdf, [uv, mapped], derivatives);
@@ -134,7 +134,7 @@ impl Scene {
         }
         let (position, triangle) = (a * w + b * u + c * v, index as u32);
         let offset = offset::of_triangle(a, b, c);
-        Surface { position, geometric: normal, frame, up, spot, bsdf, emitter, offset, triangle }
+        Surface { position, geometric: normal, frame, up, site, bsdf, emitter, offset, triangle }
     }
 
     /// The shading frame where it has to follow the texture coordinates, and `normal` in it. `at` are the place where
@@ -154,15 +154,15 @@ impl Scene {
     fn solid_surface(&self, index: usize, near: DVec3) -> Surface {
         let SurfacePoint { position, normal, offset, .. } = self.solids[index].surface_point(near);
         let Shape { bsdf, emitter, textured, oriented, .. } = self.shapes[self.solid_shapes[index] as usize];
-        let (mut spot, mut frame, mut up) = (Spot::default(), Frame::around(normal), DVec3::Z);
+        let (mut site, mut frame, mut up) = (Site::default(), Frame::around(normal), DVec3::Z);
         if textured {
             let chart = self.solids[index].chart(position);
-            spot = Spot::new(chart.uv, self.bsdf(bsdf).texture());
+            site = Site::new(chart.uv, self.bsdf(bsdf).texture());
             if oriented {
                 (frame, up) = self.orient(normal, bsdf, [chart.uv; 2], chart.derivatives);
             }
         }
-        Surface { position, geometric: normal, frame, up, spot, bsdf, emitter, offset, triangle: NO_TRIANGLE }
+        Surface { position, geometric: normal, frame, up, site, bsdf, emitter, offset, triangle: NO_TRIANGLE }
     }
 
     /// The scattering model `id`.

@@ -2,7 +2,7 @@
 
 use super::{BsdfId, EmitterId, Origin};
 use crate::math::Frame;
-use crate::texture::Spot;
+use crate::texture::Site;
 use glam::DVec3;
 
 /// A point on a surface.
@@ -17,7 +17,7 @@ pub struct Surface {
     /// The shading normal before a relief tilted it, in the shading frame: +z where there is none.
     pub up: DVec3,
     /// Where its textures are looked up.
-    pub spot: Spot,
+    pub site: Site,
     /// How it scatters.
     pub bsdf: BsdfId,
     /// Whether it shines.

@@ -14,7 +14,7 @@
 use super::{Scene, Surface};
 use crate::bsdf::{Bsdf, Evaluation, Scatter};
 use crate::math::{Row, SolidAnglePdf, Walk};
-use crate::texture::{Relief, Spot};
+use crate::texture::{Relief, Site};
 use glam::DVec3;
 
 /// The frame in which a direction meets the surface.
@@ -62,14 +62,14 @@ impl Scene {
             return None;
         }
         let relief = self.reliefs[at.bsdf.0 as usize].as_ref()?;
-        Some(Tilted { bsdf: self.bsdf(at.bsdf), relief, up: at.up, spot: &at.spot })
+        Some(Tilted { bsdf: self.bsdf(at.bsdf), relief, up: at.up, site: &at.site })
     }
 
     /// What scattering from `wi` to `wo` at a surface amounts to; see [`Bsdf::evaluate`].
     #[inline]
     pub fn evaluate(&self, at: &Surface, wi: DVec3, wo: DVec3, walk: Walk) -> Option<Evaluation> {
         match self.tilted(at) {
-            None => self.bsdf(at.bsdf).evaluate(&at.spot, wi, wo, walk),
+            None => self.bsdf(at.bsdf).evaluate(&at.site, wi, wo, walk),
             Some(tilted) => tilted.evaluate(wi, wo, walk),
         }
     }
@@ -78,7 +78,7 @@ impl Scene {
     #[inline]
     pub fn scatter(&self, at: &Surface, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
         match self.tilted(at) {
-            None => self.bsdf(at.bsdf).sample(&at.spot, wi, row, walk),
+            None => self.bsdf(at.bsdf).sample(&at.site, wi, row, walk),
             Some(tilted) => tilted.sample(wi, row, walk),
         }
     }
@@ -96,7 +96,7 @@ struct Tilted<'a> {
     relief: &'a Relief,
     /// The untilted normal.
     up: DVec3,
-    spot: &'a Spot,
+    site: &'a Site,
 }
 
 impl Tilted<'_> {
@@ -112,7 +112,7 @@ impl Tilted<'_> {
         };
         let within = |facing: Facing| {
             let admitted = facing.admits(wi) && facing.admits(wo);
-            let found = || self.bsdf.evaluate(self.spot, facing.turn(wi), facing.turn(wo), walk);
+            let found = || self.bsdf.evaluate(self.site, facing.turn(wi), facing.turn(wo), walk);
             if admitted { found() } else { None }
         };
         let found = within(decides)?;
@@ -129,7 +129,7 @@ impl Tilted<'_> {
 
     fn sample(&self, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
         let own = self.facing(wi);
-        let sampled = self.bsdf.sample(self.spot, own.turn(wi), row, walk)?;
+        let sampled = self.bsdf.sample(self.site, own.turn(wi), row, walk)?;
         let direction = own.turn(sampled.direction);
         if !own.admits(direction) {
             return None;
@@ -191,7 +191,7 @@ mod tests {
         let relief = relief();
         let frame = tilted(oriented(DVec3::Z, DVec3::X), &relief.map, [DVec2::ZERO; 2], [DVec3::X, DVec3::Y]);
         let up = frame.to_local(DVec3::Z);
-        check(Tilted { bsdf, relief: &relief, up, spot: &Spot::default() }, frame)
+        check(Tilted { bsdf, relief: &relief, up, site: &Site::default() }, frame)
     }
 
     /// Values times cosine, as Mitsuba 3.9.1 has them for a bump map with this slope: as it is, mirrored, from behind.

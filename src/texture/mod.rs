@@ -4,13 +4,13 @@ pub mod attribute;
 mod bitmap;
 mod checkerboard;
 mod picture;
-mod spot;
+mod site;
 
 pub use attribute::{Attribute, Draped};
 pub use bitmap::{Bitmap, Lookup, Wrap};
 pub use checkerboard::Checkerboard;
 pub use picture::{Picture, Texels};
-pub use spot::Spot;
+pub use site::Site;
 
 use crate::spectrum::Spectrum;
 use glam::DVec2;
@@ -62,12 +62,12 @@ pub enum Colour {
 }
 
 impl Colour {
-    /// The colour at `spot`.
+    /// The colour at `site`.
     #[inline]
-    pub fn at(&self, spot: &Spot) -> Spectrum {
+    pub fn at(&self, site: &Site) -> Spectrum {
         match self {
             Self::Constant(colour) => *colour,
-            Self::Textured(texture) => spot.colour(texture),
+            Self::Textured(texture) => site.colour(texture),
         }
     }
 
@@ -138,12 +138,12 @@ pub enum Number {
 }
 
 impl Number {
-    /// The number at `spot`.
+    /// The number at `site`.
     #[inline]
-    pub fn at(&self, spot: &Spot) -> f64 {
+    pub fn at(&self, site: &Site) -> f64 {
         match self {
             Self::Constant(number) => *number,
-            Self::Textured(texture) => spot.colour(texture).luminance(),
+            Self::Textured(texture) => site.colour(texture).luminance(),
         }
     }
 

@@ -4,7 +4,7 @@ use super::{Clearcoat, Principled};
 use crate::bsdf::{Distribution, Evaluation, Letter, Microfacet, flip, fresnel, lobes};
 use crate::math::{SolidAnglePdf, Walk, warp::hemisphere};
 use crate::spectrum::Spectrum;
-use crate::texture::{Number, Spot};
+use crate::texture::{Number, Site};
 use glam::{DVec2, DVec3};
 use std::f64::consts::FRAC_1_PI;
 
@@ -60,13 +60,13 @@ fn mix(a: f64, b: f64, t: f64) -> f64 {
 }
 
 impl Local {
-    pub fn of(model: &Principled, spot: &Spot) -> Self {
+    pub fn of(model: &Principled, site: &Site) -> Self {
         // Textures may hold other numbers.
-        let unit = |number: &Number| number.at(spot).clamp(0.0, 1.0);
+        let unit = |number: &Number| number.at(site).clamp(0.0, 1.0);
         let (roughness, aspect) = (unit(&model.roughness), (1.0 - 0.9 * unit(&model.anisotropic)).sqrt());
         let alpha = DVec2::new(1.0 / aspect, aspect) * roughness * roughness;
         Self {
-            color: model.base_color.at(spot),
+            color: model.base_color.at(site),
             roughness,
             metallic: unit(&model.metallic),
             spec_trans: unit(&model.spec_trans),

@@ -8,7 +8,7 @@ use std::ptr;
 /// A place on the texture plane. It may know the colour of one texture there: a model asks for the same colour each time
 /// that it is evaluated, and pixels that are not in the cache are best fetched while there is other work to do.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Spot {
+pub struct Site {
     /// Texture coordinates, or a place in the chart of a mesh.
     pub uv: DVec2,
     /// Address of the texture whose colour is known; 0 for none.
@@ -16,7 +16,7 @@ pub struct Spot {
     colour: Spectrum,
 }
 
-impl Spot {
+impl Site {
     /// The place `uv`, with the colour of `texture` there.
     #[inline]
     pub fn new(uv: DVec2, texture: Option<&Texture>) -> Self {
@@ -33,7 +33,7 @@ impl Spot {
     }
 }
 
-impl From<DVec2> for Spot {
+impl From<DVec2> for Site {
     #[inline]
     fn from(uv: DVec2) -> Self {
         Self { uv, known: 0, colour: Spectrum::BLACK }
@@ -54,10 +54,10 @@ mod tests {
         };
         let [one, other] = [board(1.0), board(3.0)];
         for uv in [DVec2::new(0.1, 0.2), DVec2::new(0.1, 0.7)] {
-            let spot = Spot::new(uv, Some(&one));
+            let site = Site::new(uv, Some(&one));
             for texture in [&one, &other] {
-                assert_eq!(spot.colour(texture), texture.colour(uv));
-                assert_eq!(Spot::from(uv).colour(texture), texture.colour(uv));
+                assert_eq!(site.colour(texture), texture.colour(uv));
+                assert_eq!(Site::from(uv).colour(texture), texture.colour(uv));
             }
         }
     }
