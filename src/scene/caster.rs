@@ -65,7 +65,12 @@ impl<'a> Caster<'a> {
     /// How much more often an emitter is chosen for direct light at `point` than by power.
     #[inline]
     pub fn preference(&self, id: EmitterId, point: DVec3) -> f64 {
-        self.tree.map_or(1.0, |tree| tree.probability(point, id.0 as usize) / self.scene.choice_by_power(id))
+        let by_power = self.scene.choice_by_power(id);
+        match self.tree {
+            Some(tree) if by_power > 0.0 => tree.probability(point, id.0 as usize) / by_power,
+            // A light that is never chosen is never preferred either.
+            _ => 1.0,
+        }
     }
 
     /// Rays cast so far.
