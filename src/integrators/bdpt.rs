@@ -9,6 +9,7 @@ use crate::paths::{
     Connection, Random, Subpath, Techniques, Vertex, connect, light_vertex_for, trace_camera, trace_light,
 };
 use crate::scene::{Caster, LightChoice, Scene};
+use glam::DVec2;
 
 /// Vertices of a subpath before Russian roulette sets in.
 pub(super) const ROULETTE_FROM: usize = 5;
@@ -77,6 +78,27 @@ impl Job<'_> {
             Some(film) => splats.add(kernel, film, found.class, found.value),
             None => band.add(pixel, found.class, found.value),
         });
+    }
+}
+
+/// Connects all parts of `light` that have left the light with the lens, at a point of its own: film position and what is
+/// found. `lens` is memory for the vertex there.
+#[inline]
+pub(super) fn connect_with_lens(
+    scene: &Caster<'_>,
+    light: &[Vertex],
+    lens: &mut Subpath,
+    techniques: &Techniques,
+    stream: &mut Stream,
+    mut add: impl FnMut(DVec2, Connection),
+) {
+    let row = stream.row();
+    trace_camera(scene, DVec2::ZERO, row, &mut Random(stream), 1, ROULETTE_FROM, lens);
+    for s in 2..=light.len() {
+        let found = connect(scene, &light[..s], &lens.vertices, techniques);
+        if let Some((found, film)) = found.and_then(|found| Some((found, found.film?))) {
+            add(film, found);
+        }
     }
 }
 

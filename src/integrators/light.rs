@@ -5,15 +5,14 @@
 //! glass: a path whose last vertex before the lens has delta lobes only has no technique here. Light that the camera sees
 //! directly is found by a walk from there.
 
-use super::bdpt::ROULETTE_FROM;
+use super::bdpt::{ROULETTE_FROM, connect_with_lens};
 use super::path::Path;
 use super::photons::{JOBS, job_range};
 use super::{Counts, render::Settings};
 use crate::film::{Film, Kernel, Splats};
 use crate::math::Stream;
-use crate::paths::{Random, Subpath, Techniques, connect, trace_camera, trace_light};
+use crate::paths::{Random, Subpath, Techniques, trace_light};
 use crate::scene::{Caster, Scene};
-use glam::DVec2;
 use rayon::prelude::*;
 
 /// The method's settings.
@@ -47,14 +46,9 @@ impl Light {
         let mut splats = Splats::new(size);
         for _ in job_range(size[0] * size[1], job) {
             trace_light(&caster, &mut Random(&mut stream), self.max_depth, ROULETTE_FROM, &mut light);
-            let row = stream.row();
-            trace_camera(&caster, DVec2::ZERO, row, &mut Random(&mut stream), 1, ROULETTE_FROM, &mut lens);
-            for s in 2..=light.vertices.len() {
-                let found = connect(&caster, &light.vertices[..s], &lens.vertices, &Techniques::ALONE);
-                if let Some((found, film)) = found.and_then(|found| Some((found, found.film?))) {
-                    splats.add(kernel, film, found.class, found.value);
-                }
-            }
+            connect_with_lens(&caster, &light.vertices, &mut lens, &Techniques::ALONE, &mut stream, |film, found| {
+                splats.add(kernel, film, found.class, found.value);
+            });
         }
         (splats, caster.rays())
     }

@@ -7,14 +7,14 @@
 //! same everywhere, as the weights need a density that depends on the path alone; it starts at what a pixel usually covers
 //! and shrinks from pass to pass by the rule of Knaus and Zwicker (2011), so that passes are independent estimates.
 
-use super::bdpt::{ROULETTE_FROM, connect_all};
+use super::bdpt::{ROULETTE_FROM, connect_all, connect_with_lens};
 use super::grid::{Grids, Located};
 use super::path::film_position;
 use super::photons::{JOBS, is_beside, job_range, shrinkage};
 use super::{Counts, render::Settings};
 use crate::film::{Film, Kernel, Splats};
-use crate::math::{Row, Stream};
-use crate::paths::{Heuristic, Random, Subpath, Techniques, Vertex, connect, merge, trace_camera, trace_light};
+use crate::math::Stream;
+use crate::paths::{Heuristic, Random, Subpath, Techniques, Vertex, merge, trace_camera, trace_light};
 use crate::scene::{Caster, LightChoice, Scene};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -149,14 +149,9 @@ impl Vcm {
         let share = (size[0] * size[1]) as f64 / self.paths as f64;
         for _ in job_range(self.paths, job) {
             trace_light(&caster, &mut Random(&mut stream), self.max_depth, ROULETTE_FROM, &mut light);
-            let row: Row = stream.row();
-            trace_camera(&caster, DVec2::ZERO, row, &mut Random(&mut stream), 1, ROULETTE_FROM, &mut lens);
-            for s in 2..=light.vertices.len() {
-                let found = connect(&caster, &light.vertices[..s], &lens.vertices, techniques);
-                if let Some((found, film)) = found.and_then(|found| Some((found, found.film?))) {
-                    bundle.splats.add(kernel, film, found.class, found.value * share);
-                }
-            }
+            connect_with_lens(&caster, &light.vertices, &mut lens, techniques, &mut stream, |film, found| {
+                bundle.splats.add(kernel, film, found.class, found.value * share);
+            });
             bundle.vertices.extend_from_slice(&light.vertices);
             bundle.ends.push(bundle.vertices.len());
         }
