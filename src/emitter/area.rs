@@ -1,7 +1,7 @@
 //! Surfaces that shine evenly into the hemisphere of their normal; how much may vary over the surface.
 
 use super::Start;
-use crate::geometry::Solid;
+use crate::geometry::{NO_TRIANGLE, Solid};
 use crate::math::{AreaPdf, Discrete, Frame, Row, SolidAnglePdf, warp};
 use crate::spectrum::Spectrum;
 use crate::texture::Colour;
@@ -47,6 +47,8 @@ pub enum Surface {
         facets: Vec<Facet>,
         /// Choice by area.
         choice: Discrete,
+        /// Index of the first of them in the scene.
+        first: u32,
     },
     /// A sphere or a cylinder that shines outwards, or a disk.
     Solid(Solid),
@@ -54,11 +56,11 @@ pub enum Surface {
 
 impl Surface {
     /// The surface of triangles with the given corners, counter-clockwise as seen from the shining side, and their
-    /// texture coordinates; `None` when their area is zero or not finite.
-    pub fn triangles(corners: impl Iterator<Item = ([DVec3; 3], [Vec2; 3])>) -> Option<Self> {
+    /// texture coordinates; `first` is the scene's index of the first. `None` when their area is zero or not finite.
+    pub fn triangles(first: u32, corners: impl Iterator<Item = ([DVec3; 3], [Vec2; 3])>) -> Option<Self> {
         let facets: Vec<Facet> = corners.map(|(corners, uvs)| Facet::new(corners, uvs)).collect();
         let areas: Vec<f64> = facets.iter().map(|facet| facet.area).collect();
-        Some(Self::Triangles { choice: Discrete::new(&areas)?, facets })
+        Some(Self::Triangles { choice: Discrete::new(&areas)?, facets, first })
     }
 
     /// Area in m².
@@ -69,21 +71,36 @@ impl Surface {
         }
     }
 
-    /// A point with its normal, uniformly by area; where it is `textured`, on triangles also its texture coordinates.
+    /// A point, uniformly by area; where it is `textured`, on triangles also its texture coordinates.
     #[inline]
-    fn sample(&self, row: Row, textured: bool) -> (DVec3, DVec3, DVec2) {
+    fn sample(&self, row: Row, textured: bool) -> Place {
         match self {
-            Self::Triangles { facets, choice } => {
+            Self::Triangles { facets, choice, first } => {
                 let (index, u) = choice.sample(row[1]);
                 let facet = &facets[index];
                 let at = warp::triangle::sample([u, row[2]]);
                 let uv = if textured { facet.uv(at) } else { DVec2::ZERO };
-                (facet.corner + facet.edges[0] * at.x + facet.edges[1] * at.y, facet.normal, uv)
+                let position = facet.corner + facet.edges[0] * at.x + facet.edges[1] * at.y;
+                Place { position, normal: facet.normal, uv, triangle: first + index as u32 }
             }
             Self::Solid(solid) => {
                 let (position, normal) = sample_solid(solid, row);
-                (position, normal, DVec2::ZERO)
+                Place { position, normal, uv: DVec2::ZERO, triangle: NO_TRIANGLE }
             }
+        }
+    }
+
+    /// The two numbers that [`Surface::sample`] maps to `position`, with the normal there as it has it; `triangle` is
+    /// what the point lies on.
+    fn invert(&self, position: DVec3, triangle: u32) -> Option<([f64; 2], DVec3)> {
+        match self {
+            Self::Triangles { facets, choice, first } => {
+                let index = triangle.checked_sub(*first)? as usize;
+                let facet = facets.get(index)?;
+                let [u, v] = warp::triangle::invert(facet.barycentric(position));
+                Some(([choice.invert(index, u), v], facet.normal))
+            }
+            Self::Solid(solid) => Some(invert_solid(solid, position)),
         }
     }
 
@@ -93,11 +110,19 @@ impl Surface {
             (_, Colour::Constant(radiance)) => self.area() * radiance.luminance(),
             (Self::Triangles { facets, .. }, _) => facets.iter().map(|facet| facet.area * facet.mean(radiance)).sum(),
             (Self::Solid(solid), _) => {
-                let uv = |[u, v]: [f64; 2]| solid.chart(self.sample([0.0, u, v, 0.0], false).0).uv;
+                let uv = |[u, v]: [f64; 2]| solid.chart(self.sample([0.0, u, v, 0.0], false).position).uv;
                 self.area() * mean(PROBES[1], |u| radiance.at(&uv(u).into()).luminance().max(0.0))
             }
         }
     }
+}
+
+/// A sampled point.
+struct Place {
+    position: DVec3,
+    normal: DVec3,
+    uv: DVec2,
+    triangle: u32,
 }
 
 /// A point of a solid with its normal, uniformly by area.
@@ -120,6 +145,26 @@ fn sample_solid(solid: &Solid, row: Row) -> (DVec3, DVec3) {
     }
 }
 
+/// The inverse of [`sample_solid`], with the normal.
+fn invert_solid(solid: &Solid, position: DVec3) -> ([f64; 2], DVec3) {
+    match solid {
+        Solid::Sphere { center, .. } => {
+            let normal = (position - *center).normalize_or(DVec3::Z);
+            (warp::sphere::invert(normal), normal)
+        }
+        Solid::Disk { center, normal, radius, .. } => {
+            let at = Frame::around(*normal).to_local(position - *center) / *radius;
+            (warp::disk::invert(at.truncate()), *normal)
+        }
+        Solid::Cylinder { bottom, axes, length, .. } => {
+            let local = axes.to_local(position - *bottom);
+            let turn = local.y.atan2(local.x) / (2.0 * PI);
+            let normal = (axes.tangent * local.x + axes.bitangent * local.y).normalize_or(axes.tangent);
+            ([if turn < 0.0 { turn + 1.0 } else { turn }, local.z / *length], normal)
+        }
+    }
+}
+
 impl Facet {
     fn new([a, b, c]: [DVec3; 3], uvs: [Vec2; 3]) -> Self {
         let edges = [b - a, c - a];
@@ -135,6 +180,14 @@ impl Facet {
     /// Unit normal on the shining side.
     pub(super) fn normal(&self) -> DVec3 {
         self.normal
+    }
+
+    /// Barycentric coordinates of the second and the third corner at a point of the triangle.
+    fn barycentric(&self, position: DVec3) -> DVec2 {
+        let across = position - self.corner;
+        let [a, b] = self.edges;
+        let share = |first: DVec3, second: DVec3| first.cross(second).dot(self.normal) / (2.0 * self.area);
+        DVec2::new(share(across, b), share(a, across))
     }
 
     /// Texture coordinates at the barycentric coordinates of the second and the third corner.
@@ -164,11 +217,17 @@ impl Area {
     #[inline]
     pub(super) fn start(&self, row: Row) -> (Start, AreaPdf) {
         let textured = !self.radiance.is_constant();
-        let (position, normal, mut uv) = self.surface.sample(row, textured);
+        let Place { position, normal, mut uv, triangle } = self.surface.sample(row, textured);
         if let (Surface::Solid(solid), true) = (&self.surface, textured) {
             uv = solid.chart(position).uv;
         }
-        (Start::Surface { position, normal, uv }, self.start_pdf())
+        (Start::Surface { position, normal, uv, triangle }, self.start_pdf())
+    }
+
+    /// A row that [`Area::start`] takes to a point of `triangle`.
+    pub(super) fn invert_start(&self, position: DVec3, triangle: u32, gamma: Row) -> Option<Row> {
+        let ([u, v], _) = self.surface.invert(position, triangle)?;
+        Some([gamma[0], u, v, gamma[3]])
     }
 
     #[inline]
@@ -189,6 +248,15 @@ impl Area {
     pub(super) fn emit(&self, position: DVec3, normal: DVec3, uv: DVec2, row: Row) -> (DVec3, DVec3, Spectrum) {
         let local = warp::hemisphere::sample([row[1], row[2]]);
         (position, Frame::around(normal).to_world(local), self.radiance(uv, 1.0) * PI)
+    }
+
+    /// A row that [`Area::emit`] takes from a point of `triangle` along `direction`. The normal is that of the sampled
+    /// start, since the frame around one that differs in the last bit, of a hit, may be another one.
+    pub(super) fn invert_emission(&self, position: DVec3, triangle: u32, direction: DVec3, gamma: Row) -> Option<Row> {
+        let (_, normal) = self.surface.invert(position, triangle)?;
+        let local = Frame::around(normal).to_local(direction);
+        let [u, v] = warp::hemisphere::invert(local);
+        (local.z > 0.0).then_some([gamma[0], u, v, gamma[3]])
     }
 
     #[inline]

@@ -22,6 +22,11 @@ impl Constant {
         (Start::Infinite { towards: warp::sphere::sample([row[1], row[2]]) }, self.start_pdf())
     }
 
+    pub(super) fn invert_start(&self, towards: DVec3, gamma: Row) -> Row {
+        let [u, v] = warp::sphere::invert(towards);
+        [gamma[0], u, v, gamma[3]]
+    }
+
     #[inline]
     pub(super) fn start_pdf(&self) -> AreaPdf {
         AreaPdf(warp::sphere::PDF.0)

@@ -83,15 +83,36 @@ impl Environment {
         (Start::Infinite { towards }, AreaPdf(self.start_pdf(towards).0.max(f64::MIN_POSITIVE)))
     }
 
+    /// Densities with which the image and the sun are chosen and give `towards`.
     #[inline]
-    pub(super) fn start_pdf(&self, towards: DVec3) -> AreaPdf {
+    fn densities(&self, towards: DVec3) -> [f64; 2] {
         let image = self.backdrop.image.as_ref();
         let sky = image.map_or(0.0, |(image, rotation)| image.pdf(rotation.transpose() * towards).0);
         let sun = match &self.backdrop.sun {
             Some(sun) if sun.covers(towards) => warp::cone::pdf(sun.cap).0,
             _ => 0.0,
         };
-        AreaPdf(self.choice.pdf(0) * sky + self.choice.pdf(1) * sun)
+        [self.choice.pdf(0) * sky, self.choice.pdf(1) * sun]
+    }
+
+    /// A row that [`Environment::start`] maps to `towards`; image or sun are drawn in proportion to their densities.
+    pub(super) fn invert_start(&self, towards: DVec3, gamma: Row) -> Option<Row> {
+        let densities = self.densities(towards);
+        let (which, _) = Discrete::new(&densities)?.sample(gamma[1]);
+        let [u, v] = match (which, &self.backdrop) {
+            (0, Backdrop { image: Some((image, rotation)), .. }) => image.invert(rotation.transpose() * towards),
+            (1, Backdrop { sun: Some(sun), .. }) => {
+                warp::cone::invert(Frame::around(sun.towards).to_local(towards), sun.cap)
+            }
+            _ => return None,
+        };
+        Some([gamma[0], self.choice.invert(which, u), v, gamma[3]])
+    }
+
+    #[inline]
+    pub(super) fn start_pdf(&self, towards: DVec3) -> AreaPdf {
+        let [sky, sun] = self.densities(towards);
+        AreaPdf(sky + sun)
     }
 
     #[inline]

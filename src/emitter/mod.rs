@@ -43,6 +43,8 @@ pub enum Start {
         normal: DVec3,
         /// Texture coordinates.
         uv: DVec2,
+        /// The triangle of the scene that it lies on, or [`crate::geometry::NO_TRIANGLE`].
+        triangle: u32,
     },
     /// At an isolated point, which no ray can hit.
     Point {
@@ -93,6 +95,42 @@ impl Emitter {
         }
     }
 
+    /// A row that [`Emitter::start`] maps to `start`; numbers that the sampling leaves open are taken from `gamma`, and so
+    /// is the part of a light where several cover `start`. The first number is that of the choice among emitters.
+    pub fn invert_start(&self, start: &Start, gamma: Row) -> Option<Row> {
+        match (self, start) {
+            (Self::Area(area), Start::Surface { position, triangle, .. }) => {
+                area.invert_start(*position, *triangle, gamma)
+            }
+            (Self::Constant(constant), Start::Infinite { towards }) => Some(constant.invert_start(*towards, gamma)),
+            (Self::Environment(environment), Start::Infinite { towards }) => environment.invert_start(*towards, gamma),
+            (Self::Point(_) | Self::Spot(_), Start::Point { .. }) => Some(gamma),
+            (Self::Directional(_), Start::Distant { .. }) => Some(gamma),
+            _ => None,
+        }
+    }
+
+    /// A row that [`Emitter::emit`] maps to the ray from `start` along `direction` that passes `point`.
+    pub fn invert_emission(&self, start: &Start, direction: DVec3, point: DVec3, gamma: Row) -> Option<Row> {
+        match (self, start) {
+            (Self::Area(area), Start::Surface { position, triangle, .. }) => {
+                area.invert_emission(*position, *triangle, direction, gamma)
+            }
+            (Self::Constant(constant), Start::Infinite { towards }) => {
+                Some(constant.reach.invert_origin(*towards, point, gamma))
+            }
+            (Self::Environment(environment), Start::Infinite { towards }) => {
+                Some(environment.reach().invert_origin(*towards, point, gamma))
+            }
+            (Self::Directional(directional), Start::Distant { towards }) => {
+                Some(directional.reach.invert_origin(*towards, point, gamma))
+            }
+            (Self::Point(_), Start::Point { .. }) => Some(Point::invert_emission(direction, gamma)),
+            (Self::Spot(spot), Start::Point { .. }) => spot.invert_emission(direction, gamma),
+            _ => None,
+        }
+    }
+
     /// Density with which [`Emitter::start`] finds `start`.
     #[inline]
     pub fn start_pdf(&self, start: &Start) -> AreaPdf {
@@ -125,7 +163,7 @@ impl Emitter {
     #[inline]
     pub fn emit(&self, start: &Start, row: Row) -> Option<(DVec3, DVec3, Spectrum)> {
         match (self, start) {
-            (Self::Area(area), Start::Surface { position, normal, uv }) => {
+            (Self::Area(area), Start::Surface { position, normal, uv, .. }) => {
                 Some(area.emit(*position, *normal, *uv, row))
             }
             (Self::Constant(constant), Start::Infinite { towards }) => Some(constant.emit(*towards, row)),

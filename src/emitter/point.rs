@@ -26,6 +26,12 @@ impl Point {
         (position, warp::sphere::sample([row[1], row[2]]), self.intensity / warp::sphere::PDF.0)
     }
 
+    /// A row that [`Point::emit`] maps to `direction`.
+    pub(super) fn invert_emission(direction: DVec3, gamma: Row) -> Row {
+        let [u, v] = warp::sphere::invert(direction);
+        [gamma[0], u, v, gamma[3]]
+    }
+
     pub(super) fn power(&self) -> f64 {
         self.intensity.luminance() * 4.0 * PI
     }

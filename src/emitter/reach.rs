@@ -32,4 +32,11 @@ impl Reach {
         let at = warp::disk::sample([row[1], row[2]]);
         self.center + (frame.tangent * at.x + frame.bitangent * at.y + towards) * self.radius
     }
+
+    /// A row that [`Reach::origin`] maps to the origin of the ray from `towards` that passes `point`.
+    pub(super) fn invert_origin(&self, towards: DVec3, point: DVec3, gamma: Row) -> Row {
+        let local = Frame::around(towards).to_local(point - self.center) / self.radius;
+        let [u, v] = warp::disk::invert(local.truncate());
+        [gamma[0], u, v, gamma[3]]
+    }
 }

@@ -55,6 +55,12 @@ impl Spot {
         (position, direction, self.intensity(direction) / warp::cone::pdf(self.cap()).0)
     }
 
+    /// A row that [`Spot::emit`] maps to `direction`; `None` outside the cone.
+    pub(super) fn invert_emission(&self, direction: DVec3, gamma: Row) -> Option<Row> {
+        let [u, v] = warp::cone::invert(Frame::around(self.axis).to_local(direction), self.cap());
+        (u < 1.0).then_some([gamma[0], u, v, gamma[3]])
+    }
+
     #[inline]
     pub(super) fn direction_pdf(&self, direction: DVec3) -> SolidAnglePdf {
         if self.axis.angle_between(direction) < self.cutoff { warp::cone::pdf(self.cap()) } else { SolidAnglePdf(0.0) }

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use super::*;
+use crate::geometry::Solid;
 use crate::math::{Stream, warp};
 use crate::texture::{Bitmap, Colour, Lookup, Picture, Texels, Texture, Wrap};
 use glam::{DAffine2, DMat3, Vec2};
@@ -53,8 +54,13 @@ fn spot() -> Spot {
 
 fn all() -> Vec<Emitter> {
     let grey = Spectrum::grey(2.0);
-    let sphere = crate::geometry::Solid::sphere(DVec3::X, 0.5);
+    let sphere = Solid::sphere(DVec3::X, 0.5);
+    let disk = Solid::disk(DVec3::ONE, DVec3::new(0.6, 0.0, -0.8), 2.0);
+    let cylinder = Solid::cylinder(DVec3::X, DVec3::new(1.0, 2.0, 3.0), 0.5);
     let others = [
+        Emitter::Area(Area::new(grey.into(), Surface::Solid(disk))),
+        Emitter::Area(Area::new(grey.into(), Surface::Solid(cylinder))),
+        Emitter::Area(Area::new(grey.into(), mesh())),
         Emitter::Area(Area::new(grey.into(), Surface::Solid(sphere))),
         Emitter::Area(textured()),
         Emitter::Area(Area::new(textured().radiance, Surface::Solid(sphere))),
@@ -67,13 +73,20 @@ fn all() -> Vec<Emitter> {
     environments().into_iter().chain(others).collect()
 }
 
+/// Triangles of several sizes, one of them without area, from the scene's seventh on.
+fn mesh() -> Surface {
+    let corners = [[0, 1, 2], [1, 2, 2], [1, 3, 2], [0, 2, 3]];
+    let points = [DVec3::ZERO, DVec3::X, DVec3::Y * 2.0, DVec3::new(1.0, 2.0, 3.0)];
+    Surface::triangles(7, corners.map(|corners| (corners.map(|i| points[i]), [Vec2::ZERO; 3])).into_iter()).unwrap()
+}
+
 /// A triangle whose brightness is its x coordinate.
 fn textured() -> Area {
     let picture = Picture::new([2, 1], Texels::linear(vec![0.0, 1.0])).unwrap();
     let (lookup, wrap) = (Lookup::Bilinear, Wrap::Clamp);
     let bitmap = Bitmap { picture: Arc::new(picture), raw: false, lookup, wrap, to_uv: DAffine2::IDENTITY };
     let uvs = [[0.25, 0.0], [0.75, 0.0], [0.25, 1.0]].map(Vec2::from);
-    let surface = Surface::triangles([([DVec3::ZERO, DVec3::X, DVec3::Y * 2.0], uvs)].into_iter()).unwrap();
+    let surface = Surface::triangles(0, [([DVec3::ZERO, DVec3::X, DVec3::Y * 2.0], uvs)].into_iter()).unwrap();
     Area::new(Colour::Textured(Arc::new(Texture::Bitmap(bitmap))), surface)
 }
 
@@ -89,7 +102,7 @@ fn textured_lights_shine_by_their_texture() {
         assert!(area.radiance(&start, -DVec3::Z).is_black());
     }
     // A sphere has u = 1/2 at −x and v, which the texture leaves aside, along z.
-    let ball = crate::geometry::Solid::sphere(DVec3::ZERO, 1.0);
+    let ball = Solid::sphere(DVec3::ZERO, 1.0);
     let area = Emitter::Area(Area::new(textured().radiance, Surface::Solid(ball)));
     for _ in 0..1000 {
         let (start, _) = area.start(stream.row());
@@ -173,6 +186,52 @@ fn power_is_what_is_emitted() {
         // The power of a textured light, which lights are chosen by only, is measured at some points.
         let slack = if matches!(&emitter, Emitter::Area(area) if !area.radiance.is_constant()) { 0.03 } else { 1e-9 };
         assert!(off < 4.5 * error + slack * mean, "{emitter:?}: {mean} ± {error}, power {}", emitter.power());
+    }
+}
+
+/// Position of a start, or its direction.
+fn place(start: &Start) -> DVec3 {
+    match *start {
+        Start::Surface { position, .. } | Start::Point { position } => position,
+        Start::Infinite { towards } | Start::Distant { towards } => towards,
+    }
+}
+
+/// Samples of a start and of the ray from it come back from the rows that they are inverted to. Rows that are drawn evenly
+/// are inverted to rows that are even: each of the numbers is counted in bins.
+#[test]
+fn starts_and_rays_invert() {
+    const BINS: usize = 16;
+    const SAMPLES: usize = 40_000;
+    for emitter in all() {
+        let mut stream = Stream::new(8, &[]);
+        let mut counts = [[[0.0f64; BINS]; 3]; 2];
+        for _ in 0..SAMPLES {
+            let rows = [stream.row(), stream.row()];
+            let (start, _) = emitter.start(rows[0]);
+            let (origin, direction, _) = emitter.emit(&start, rows[1]).unwrap();
+            let point = origin + direction * (0.1 + stream.number());
+            let back = [
+                emitter.invert_start(&start, stream.row()).unwrap(),
+                emitter.invert_emission(&start, direction, point, stream.row()).unwrap(),
+            ];
+            let again = emitter.start(back[0]).0;
+            assert!((place(&again) - place(&start)).length() < 1e-9, "{emitter:?}: {start:?} {again:?}");
+            let (from, along, _) = emitter.emit(&start, back[1]).unwrap();
+            let off = (from - origin).length().max((along - direction).length());
+            assert!(off < 1e-9, "{emitter:?}: {off:e} from {:?} to {:?}", rows[1], back[1]);
+            for (counts, row) in counts.iter_mut().zip(back) {
+                for (counts, number) in counts.iter_mut().zip(row) {
+                    counts[(number * BINS as f64) as usize] += 1.0;
+                }
+            }
+        }
+        let mean = SAMPLES as f64 / BINS as f64;
+        for counts in counts.as_flattened() {
+            // 15 degrees of freedom: 55 is passed by chance less than once in 10⁵ times; there are some hundred sums.
+            let sum: f64 = counts.iter().map(|count| (count - mean).powi(2) / mean).sum();
+            assert!(sum < 60.0, "{emitter:?}: {sum}");
+        }
     }
 }
 

@@ -296,7 +296,7 @@ mod tests {
                 3 => Emitter::Area(Area::new(intensity.into(), Surface::Solid(Solid::sphere(position, 0.01 + b)))),
                 _ => {
                     let corners = [position, position + axis, position + DVec3::new(a, b, u)];
-                    let surface = Surface::triangles([(corners, [Vec2::ZERO; 3])].into_iter()).unwrap();
+                    let surface = Surface::triangles(0, [(corners, [Vec2::ZERO; 3])].into_iter()).unwrap();
                     Emitter::Area(Area::new(intensity.into(), surface))
                 }
             }

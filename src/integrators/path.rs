@@ -160,7 +160,7 @@ impl Job<'_> {
     #[inline]
     pub(super) fn emission(&self, surface: &Surface, state: &State, pixel: [usize; 2], band: &mut Band) {
         let Some(id) = surface.emitter else { return };
-        let start = Start::Surface { position: surface.position, normal: surface.geometric, uv: surface.site.uv };
+        let start = surface.start();
         let radiance = self.scene.emitter(id).radiance(&start, -state.direction);
         if radiance.is_black() {
             return;

@@ -41,10 +41,7 @@ fn see_light(scene: &Caster<'_>, camera: &[Vertex], techniques: &Techniques) -> 
     let [.., previous, end] = camera else { return None };
     let (id, start) = match &end.kind {
         VertexKind::Environment(id) => (*id, Start::Infinite { towards: -end.back }),
-        VertexKind::Surface(surface) => (
-            surface.emitter?,
-            Start::Surface { position: end.position, normal: surface.geometric, uv: surface.site.uv },
-        ),
+        VertexKind::Surface(surface) => (surface.emitter?, surface.start()),
         _ => return None,
     };
     if scene.hide_emitters && camera.len() == 2 {

@@ -162,11 +162,12 @@ impl Builder {
                 false => ([a, b, c], [ua, ub, uc]),
             }
         };
-        let surface = |()| Surface::triangles(mesh.triangles.iter().enumerate().map(corners));
+        let first = self.triangles.len() as u32;
+        let surface = |()| Surface::triangles(first, mesh.triangles.iter().enumerate().map(corners));
         let given = Given {
             mapped: !mesh.uvs.is_empty(),
             smooth: !mesh.normals.is_empty(),
-            chart: mesh.charted.then_some(self.triangles.len() as u32),
+            chart: mesh.charted.then_some(first),
         };
         let shape = self.shape(bsdf, radiance, given, surface)?;
         let base = self.vertices.len() as u32;

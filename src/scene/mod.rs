@@ -212,6 +212,13 @@ impl Scene {
         Some((EmitterId(index as u32), start, AreaPdf(pdf.0 * lights.pdf(index))))
     }
 
+    /// A row that [`Scene::sample_start`] maps to `start` on the emitter `id`; see [`Emitter::invert_start`].
+    pub fn invert_start(&self, id: EmitterId, start: &Start, gamma: Row) -> Option<Row> {
+        let lights = self.lights.as_ref()?;
+        let row = self.emitter(id).invert_start(start, gamma)?;
+        Some([lights.invert(id.0 as usize, row[0]), row[1], row[2], row[3]])
+    }
+
     /// Density with which [`Scene::sample_start`] finds `start` on the emitter `id`.
     #[inline]
     pub fn start_pdf(&self, id: EmitterId, start: &Start) -> AreaPdf {

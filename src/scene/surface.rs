@@ -1,6 +1,7 @@
 //! A point on a surface, with everything that scattering there needs.
 
 use super::{BsdfId, EmitterId, Origin};
+use crate::emitter::Start;
 use crate::math::Frame;
 use crate::texture::Site;
 use glam::DVec3;
@@ -29,6 +30,13 @@ pub struct Surface {
 }
 
 impl Surface {
+    /// Where light starts that a walk from the camera has met here.
+    #[inline]
+    pub fn start(&self) -> Start {
+        let Self { position, geometric: normal, site, triangle, .. } = *self;
+        Start::Surface { position, normal, uv: site.uv, triangle }
+    }
+
     /// Where a ray starts that leaves towards `direction`: moved off the surface by more than the rounding errors of
     /// its position, on the side that the ray goes to.
     #[inline]

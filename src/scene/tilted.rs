@@ -83,6 +83,14 @@ impl Scene {
         }
     }
 
+    /// A row that [`Scene::scatter`] takes from `wi` to `wo`; see [`Bsdf::invert`].
+    pub fn invert_scatter(&self, at: &Surface, wi: DVec3, wo: DVec3, delta: bool, gamma: Row) -> Option<Row> {
+        match self.tilted(at) {
+            None => self.bsdf(at.bsdf).invert(&at.site, wi, wo, delta, gamma),
+            Some(tilted) => tilted.invert(wi, wo, delta, gamma),
+        }
+    }
+
     /// `wi` as the scattering model of a surface meets it, for what a model says of a direction.
     #[inline]
     pub fn met(&self, at: &Surface, wi: DVec3) -> DVec3 {
@@ -125,6 +133,12 @@ impl Tilted<'_> {
         let pdf = within(own).map_or(none, |found| found.pdf);
         let pdf_reverse = within(other).map_or(none, |found| found.pdf_reverse);
         Some(Evaluation { value, pdf, pdf_reverse, ..found })
+    }
+
+    fn invert(&self, wi: DVec3, wo: DVec3, delta: bool, gamma: Row) -> Option<Row> {
+        let own = self.facing(wi);
+        let admitted = own.admits(wo);
+        admitted.then(|| self.bsdf.invert(self.site, own.turn(wi), own.turn(wo), delta, gamma)).flatten()
     }
 
     fn sample(&self, wi: DVec3, row: Row, walk: Walk) -> Option<Scatter> {
