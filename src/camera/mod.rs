@@ -77,6 +77,20 @@ impl Camera {
         }
     }
 
+    /// The row that [`Camera::ray`] reads for the point `lens` of the lens, with the film position `film` before it as shares
+    /// of the film's width and height; numbers that it leaves open are taken from `gamma`.
+    pub fn invert(&self, film: DVec2, lens: DVec3, gamma: Row) -> Row {
+        let [x, y] = [film.x / self.size[0] as f64, film.y / self.size[1] as f64];
+        match self.projection {
+            Projection::Perspective { lens_radius, .. } if lens_radius > 0.0 => {
+                let at = self.axes.to_local(lens - self.origin).truncate() / lens_radius;
+                let [u, v] = warp::disk::invert(at);
+                [x, y, u, v]
+            }
+            _ => [x, y, gamma[2], gamma[3]],
+        }
+    }
+
     /// How the camera sees `point`, through `lens` if it has one; `None` when the film does not show it.
     #[inline]
     pub fn sight(&self, lens: DVec3, point: DVec3) -> Option<Sight> {
@@ -190,7 +204,11 @@ mod tests {
             let mut stream = Stream::new(2, &[]);
             for _ in 0..1000 {
                 let film = DVec2::new(64.0 * stream.number(), 32.0 * stream.number());
-                let (lens, direction) = camera.ray(film, stream.row());
+                let row = stream.row();
+                let (lens, direction) = camera.ray(film, row);
+                let [x, y, u, v] = camera.invert(film, lens, row);
+                let off = [x - film.x / 64.0, y - film.y / 32.0, u - row[2], v - row[3]].map(f64::abs);
+                assert!(off.iter().all(|off| *off < 1e-9), "{row:?}: {off:?}");
                 let distance = 0.1 + 9.0 * stream.number();
                 let back = camera.sight(lens, lens + direction * distance);
                 let same = |sight: &Sight| {

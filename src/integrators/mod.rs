@@ -43,6 +43,8 @@ pub enum Method {
     Vcm,
     /// Multiplexed Metropolis light transport.
     Mmlt,
+    /// The same with reversible jumps between techniques.
+    Rjmlt,
 }
 
 impl Method {
@@ -55,6 +57,7 @@ impl Method {
             Self::Sppm => "sppm",
             Self::Vcm => "vcm",
             Self::Mmlt => "mmlt",
+            Self::Rjmlt => "rjmlt",
         }
     }
 
@@ -62,7 +65,7 @@ impl Method {
     pub fn resumes(self) -> bool {
         match self {
             Self::Path | Self::Light | Self::Bdpt | Self::Sppm | Self::Vcm => true,
-            Self::Mmlt => false,
+            Self::Mmlt | Self::Rjmlt => false,
         }
     }
 }
@@ -87,6 +90,24 @@ pub struct Counts {
     pub rays: u64,
     /// Acceptance by mutation, then by length.
     pub acceptance: BTreeMap<&'static str, Vec<Acceptance>>,
+    /// Chains by length.
+    pub chains: Vec<ChainReport>,
+}
+
+/// Chains of one target.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ChainReport {
+    /// Length of their paths in edges; `None` where they have paths of all lengths.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub length: Option<usize>,
+    /// Mean of the target: the mean luminance of their image, b, by independent samples.
+    pub mean: f64,
+    /// Its standard error.
+    pub standard_error: f64,
+    /// Their number; 0 where no light has been found.
+    pub chains: usize,
+    /// Technique changes that failed because no primary samples could be found for the new technique.
+    pub failed_inversions: u64,
 }
 
 impl Counts {
@@ -114,7 +135,8 @@ impl Integrator {
             Method::Bdpt => Self::Bdpt(bdpt::Bdpt::start(settings)),
             Method::Sppm => Self::Sppm(sppm::Sppm::start(scene, settings)),
             Method::Vcm => Self::Vcm(vcm::Vcm::start(scene, settings)),
-            Method::Mmlt => Self::Mmlt(Box::new(mmlt::Mmlt::start(scene, settings))),
+            Method::Mmlt => Self::Mmlt(Box::new(mmlt::Mmlt::start(scene, settings, mmlt::Family::Multiplexed))),
+            Method::Rjmlt => Self::Mmlt(Box::new(mmlt::Mmlt::start(scene, settings, mmlt::Family::Jumping))),
         }
     }
 

@@ -4,6 +4,7 @@ use super::photons::FIRST_RADIUS;
 use super::{Counts, Integrator, Method};
 use crate::film::{Film, Health, NoiseEstimate, PathClass};
 use crate::image::{DEPTH_KEY, INTEGRATOR_KEY, Image, SCENE_KEY};
+use crate::markov::Mutations;
 use crate::paths::Heuristic;
 use crate::scene::{LightChoice, Scene};
 use cpu_time::ProcessTime;
@@ -32,18 +33,21 @@ pub struct Settings {
     pub radius: f64,
     /// Whether sppm estimates direct light by sampling lights; else by photons too.
     pub sample_direct: bool,
+    /// How chains move.
+    pub mutations: Mutations,
 }
 
 impl Settings {
     /// How the method works, as the manifest has it: names and values of the options.
     pub fn options(&self) -> Value {
-        let Self { heuristic, lights, photons, radius, sample_direct, .. } = self;
+        let Self { heuristic, lights, photons, radius, sample_direct, mutations, .. } = self;
         json!({
             "heuristic": heuristic,
             "lights": lights,
             "photons": photons,
             "radius": radius,
             "sample_direct": sample_direct,
+            "mutations": mutations,
         })
     }
 }
@@ -61,6 +65,7 @@ impl Default for Settings {
             photons: None,
             radius: FIRST_RADIUS,
             sample_direct: true,
+            mutations: Mutations::default(),
         }
     }
 }
@@ -253,7 +258,7 @@ impl Outcome {
     pub fn summary(&self) -> Map<String, Value> {
         const PUBLISHED: [&str; 8] = ["integrator", "seed", "wall_s", "cpu_s", "samples", "rays", "passes", "health"];
         let mut summary = Map::new();
-        for name in PUBLISHED.into_iter().chain(["acceptance", "error"]) {
+        for name in PUBLISHED.into_iter().chain(["acceptance", "chains", "error"]) {
             if let Some(value) = self.image.manifest.get(name) {
                 summary.insert(name.to_owned(), value.clone());
             }
@@ -296,6 +301,7 @@ fn manifest(scene: &Scene, method: Method, settings: &Settings, outcome: &Outcom
     }
     if !outcome.counts.acceptance.is_empty() {
         set("acceptance", json!(outcome.counts.acceptance));
+        set("chains", json!(outcome.counts.chains));
     }
     set("classes", Value::Object(classes));
     manifest

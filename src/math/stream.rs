@@ -1,6 +1,7 @@
 //! Random streams. Each job of a render owns one, keyed by what the job is (seed, pass, band, …) and never by the
 //! thread that happens to run it: this is what makes images independent of the number of threads.
 
+use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
@@ -27,6 +28,12 @@ impl Stream {
     #[inline]
     pub fn number(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
+    }
+
+    /// A number with the standard normal distribution.
+    #[inline]
+    pub fn normal(&mut self) -> f64 {
+        StandardNormal.sample(&mut self.0)
     }
 
     /// The next four numbers.

@@ -21,6 +21,8 @@ pub struct Connection {
     pub class: PathClass,
     /// Film position, where the technique finds it (t = 1); else it is that of the camera subpath.
     pub film: Option<DVec2>,
+    /// What the other techniques need to know of it.
+    pub junction: Junction,
 }
 
 /// Connects all of `light` (s vertices) with all of `camera` (t ≥ 1 vertices): value, weight and class of the path.
@@ -60,7 +62,7 @@ fn see_light(scene: &Caster<'_>, camera: &[Vertex], techniques: &Techniques) -> 
     };
     let weight =
         if camera.len() == 2 { 1.0 } else { mis::weight(&[], camera, &junction, Joint::Connected, techniques) };
-    Some(Connection { value: end.throughput * radiance * weight, class: end.word.class(), film: None })
+    Some(Connection { value: end.throughput * radiance * weight, class: end.word.class(), film: None, junction })
 }
 
 /// Density, at `vertex`, of light that leaves `start` along `direction`.
@@ -182,7 +184,7 @@ fn join(
         preference: light[0].preference,
     };
     let weight = mis::weight(light, camera, &junction, Joint::Connected, techniques);
-    Some(Connection { value: value * weight, class: light_end.word.join(camera_end.word), film: None })
+    Some(Connection { value: value * weight, class: light_end.word.join(camera_end.word), film: None, junction })
 }
 
 /// t = 1: the walk from the light is connected with the lens.
@@ -218,5 +220,5 @@ fn reach_camera(
         ..Junction::default()
     };
     let weight = mis::weight(light, camera, &junction, Joint::Connected, techniques);
-    Some(Connection { value: value * weight, class: light_end.word.class(), film: Some(film) })
+    Some(Connection { value: value * weight, class: light_end.word.class(), film: Some(film), junction })
 }

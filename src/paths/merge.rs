@@ -33,5 +33,5 @@ pub fn merge(scene: &Caster<'_>, light: &[Vertex], camera: &[Vertex], techniques
     let weight = share * techniques.heuristic.map_or(1.0, |heuristic| heuristic.apply(density));
     let value = photon.throughput * scattered.value * end.throughput * (wo.z.abs() / geometric * weight);
     let class = photon.word.then(scattered.letter).join(end.word);
-    Some(Connection { value: value / techniques.merging, class, film: None })
+    Some(Connection { value: value / techniques.merging, class, film: None, junction })
 }

@@ -18,7 +18,7 @@ use crate::emitter::Start;
 /// The densities that a connection changes: those of its two end vertices and their predecessors, in a walk from the
 /// other side.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Junction {
+pub struct Junction {
     /// C of the last vertex of the light subpath.
     pub light: f64,
     /// C of the vertex before it.
@@ -29,6 +29,14 @@ pub(super) struct Junction {
     pub camera_previous: f64,
     /// How much more often direct light chooses the path's light for its first surface than walks do.
     pub preference: f64,
+}
+
+impl Junction {
+    /// What the technique with this many light vertices has beside the densities of walks.
+    #[inline]
+    fn preferred(&self, lights: usize) -> f64 {
+        if lights == 1 { self.preference } else { 1.0 }
+    }
 }
 
 impl Default for Junction {
@@ -98,13 +106,34 @@ pub(super) fn weight(
     techniques: &Techniques,
 ) -> f64 {
     let Techniques { heuristic: Some(heuristic), merging } = *techniques else { return 1.0 };
-    let merged = joint == Joint::Merged;
-    // What the technique with this many light vertices has beside the densities of walks.
-    let preferred = |lights: usize| if lights == 1 { junction.preference } else { 1.0 };
-    let own = heuristic.apply(preferred(light.len()));
+    let own = heuristic.apply(junction.preferred(light.len()));
     // After a merger the last camera vertex has scattered, perhaps in a way that no connection can.
-    let mut sum = if merged && camera[camera.len() - 1].delta { 0.0 } else { own };
+    let mut sum = if joint == Joint::Merged && camera[camera.len() - 1].delta { 0.0 } else { own };
+    for_others(light, camera, junction, joint, merging, |_, density| sum += heuristic.apply(density));
+    own / sum
+}
 
+/// Densities of all techniques for the path that connects `light` (all its vertices) with `camera` (all its vertices), by
+/// the number of light vertices and with that of the walks of this one as unit; 0 for those that cannot find it.
+pub(super) fn densities(light: &[Vertex], camera: &[Vertex], junction: &Junction, densities: &mut Vec<f64>) {
+    densities.clear();
+    densities.resize(light.len() + camera.len(), 0.0);
+    densities[light.len()] = junction.preferred(light.len());
+    for_others(light, camera, junction, Joint::Connected, 0.0, |lights, density| densities[lights] = density);
+}
+
+/// Calls `visit` with the number of light vertices and the density of every other connection that may find the path, and
+/// of every merger, which counts as the connection with one more light vertex than the camera subpath leaves.
+#[inline(always)]
+fn for_others(
+    light: &[Vertex],
+    camera: &[Vertex],
+    junction: &Junction,
+    joint: Joint,
+    merging: f64,
+    mut visit: impl FnMut(usize, f64),
+) {
+    let merged = joint == Joint::Merged;
     // Techniques with more vertices from the camera: x_{s-1}, x_{s-2}, … change sides.
     let mut ratio = 1.0;
     for i in (0..light.len()).rev() {
@@ -116,12 +145,12 @@ pub(super) fn weight(
         // The end of the subpath is connected, however the walk went on from there.
         let scatters_delta = light[i].delta && i < light.len() - 1;
         if merging > 0.0 && i > 0 && light[i].connects && !scatters_delta {
-            sum += heuristic.apply(ratio * merging * from_camera);
+            visit(i + 1, ratio * merging * from_camera);
         }
         ratio *= from_camera / light[i].forward.0;
         let possible = if i == 0 { can_be_hit(&light[0]) } else { !scatters_delta && !light[i - 1].delta };
         if possible {
-            sum += heuristic.apply(ratio * preferred(i));
+            visit(i, ratio * junction.preferred(i));
         }
     }
 
@@ -133,18 +162,18 @@ pub(super) fn weight(
             2 => junction.camera_previous,
             _ => camera[i].reverse.0,
         };
+        let lights = light.len() + camera.len() - i;
         // The end is connected, or it is the light that the walk met: however the walk went on does not matter.
         let scatters_delta = camera[i].delta && (merged || i < camera.len() - 1);
         let on_light = light.is_empty() && i == camera.len() - 1;
         if merging > 0.0 && !on_light && camera[i].connects && !scatters_delta {
-            sum += heuristic.apply(ratio * merging * from_light);
+            visit(lights, ratio * merging * from_light);
         }
         ratio *= from_light / camera[i].forward.0;
         if !scatters_delta && !camera[i - 1].delta {
-            sum += heuristic.apply(ratio * preferred(light.len() + camera.len() - i));
+            visit(lights, ratio * junction.preferred(lights));
         }
     }
-    own / sum
 }
 
 /// Whether a walk from the camera can meet the light that `vertex` lies on.

@@ -6,6 +6,7 @@
 
 mod connect;
 mod direct;
+mod full;
 mod merge;
 mod mis;
 mod rows;
@@ -14,8 +15,9 @@ mod trace;
 
 pub use connect::{Connection, connect};
 pub use direct::{Direct, direct_pdf, sample_direct};
+pub use full::{Event, FullPath};
 pub use merge::merge;
-pub use mis::{Heuristic, Techniques};
-pub use rows::{Random, Rows};
+pub use mis::{Heuristic, Junction, Techniques};
+pub use rows::{Random, Rows, Use, uses};
 pub use subpath::{Subpath, Vertex, VertexKind};
 pub use trace::{light_vertex, light_vertex_for, shading_correction, trace_camera, trace_light};

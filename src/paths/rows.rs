@@ -5,12 +5,46 @@
 //! survival). Light subpath: row 0 is the choice of the light and the point on it, row 1 the direction from there (for
 //! an infinite light the point on the disk), row i + 1 the scattering at vertex i.
 
-use crate::math::{Row, Stream};
+use crate::math::{Row, Stream, Walk};
+use crate::scene::{Scene, Surface};
+use glam::DVec3;
+
+/// What a number of a row is for: chains treat them differently.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Use {
+    /// The film position along its width.
+    FilmX,
+    /// The film position along its height.
+    FilmY,
+    /// Makes a little change where it changes a little.
+    Continuous,
+    /// Chooses among things that have nothing to do with each other.
+    Discrete,
+    /// Nothing.
+    Unused,
+}
+
+/// What the numbers of row `index` of a walk are for, where no Russian roulette is played. A light's triangle is chosen by
+/// what also places the point within it, which counts as continuous.
+pub fn uses(walk: Walk, index: usize) -> [Use; 4] {
+    use Use::{Continuous, Discrete, FilmX, FilmY, Unused};
+    match (walk, index) {
+        (Walk::FromCamera, 0) => [FilmX, FilmY, Continuous, Continuous],
+        (Walk::FromLight, 1) => [Unused, Continuous, Continuous, Unused],
+        _ => [Discrete, Continuous, Continuous, Unused],
+    }
+}
 
 /// A source of rows.
 pub trait Rows {
     /// The row at `index`. Each index is asked for once per subpath, in ascending order.
     fn row(&mut self, index: usize) -> Row;
+
+    /// The row at `index` for scattering at `surface`, where the walk came from `wi` in its shading frame.
+    #[inline]
+    fn scattering_row(&mut self, index: usize, _scene: &Scene, _surface: &Surface, _wi: DVec3) -> Row {
+        self.row(index)
+    }
 
     /// Whether walks may be ended at random by Russian roulette.
     fn roulette(&self) -> bool;

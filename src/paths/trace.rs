@@ -159,8 +159,8 @@ fn walk(
         if path.vertices.len() == vertices {
             return;
         }
-        let row = rows.row(last + 1 + row_shift);
         let wi = surface.frame.to_local(vertex.back);
+        let row = rows.scattering_row(last + 1 + row_shift, scene, &surface, wi);
         let Some(scatter) = scene.scatter(&surface, wi, row, mode) else { return };
         let direction = surface.frame.to_world(scatter.direction);
         let mut weight = scatter.weight * shading_correction(&surface, vertex.back, direction, mode);

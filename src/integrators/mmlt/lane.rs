@@ -1,0 +1,278 @@
+//! The chains of one lane, and what they do in a pass.
+
+use super::{Family, LANES, Mean, Share};
+use crate::film::{Health, Kernel, Splats};
+use crate::markov::{
+    ChainState, ControlledMemory, Found, Jump, JumpMemory, Jumps, Mutations, Tracer, Tries, controlled_step, jump,
+};
+use crate::math::Stream;
+use crate::paths::FullPath;
+use crate::scene::{Caster, Scene};
+
+/// Probability of a large step where none is given.
+const LARGE_STEP: f64 = 0.3;
+
+/// Names of the tallies.
+pub(super) const KINDS: [&str; 3] = ["large_step", "small_step", "technique_change"];
+const LARGE: usize = 0;
+const SMALL: usize = 1;
+const CHANGE: usize = 2;
+
+/// One chain.
+pub(super) struct Chain {
+    state: ChainState,
+    stream: Stream,
+    current: Found,
+    /// The path of `current`, as the technique that it came by has found it.
+    path: FullPath,
+    /// By kind, proposals and accepted ones. Technique changes of `mmlt` are among its small steps too.
+    pub tallies: [[u64; 2]; KINDS.len()],
+    /// Jumps for which no rows could be found.
+    pub failed: u64,
+}
+
+impl Chain {
+    pub(super) fn new(state: ChainState, stream: Stream, current: Found, path: FullPath) -> Self {
+        Self { state, stream, current, path, tallies: Default::default(), failed: 0 }
+    }
+
+    fn tally(&mut self, kind: usize, accepted: bool) {
+        let [proposals, successes] = &mut self.tallies[kind];
+        *proposals += 1;
+        *successes += u64::from(accepted);
+    }
+}
+
+/// What a lane made in one pass.
+pub(super) struct Job {
+    pub splats: Splats,
+    pub rays: u64,
+    /// Per length what large steps found.
+    pub large_steps: Vec<Mean>,
+    pub health: Health,
+}
+
+/// One chain of each length.
+pub(super) struct Lane {
+    /// By length; `None` where no light has been found yet.
+    pub chains: Vec<Option<Chain>>,
+    family: Family,
+    mutations: Mutations,
+    health: Health,
+    proposal: FullPath,
+    tries: Tries,
+    jumps: JumpMemory,
+    controlled: ControlledMemory,
+}
+
+/// Where and how much a mutation adds.
+struct Target<'a> {
+    splats: &'a mut Splats,
+    kernel: &'a Kernel,
+    worth: f64,
+}
+
+impl Target<'_> {
+    #[inline]
+    fn splat(&mut self, path: &Found, weight: f64) {
+        if weight > 0.0 {
+            self.splats.add(self.kernel, path.film, path.class, path.value * (weight * self.worth / path.luminance));
+        }
+    }
+}
+
+impl Lane {
+    pub(super) fn new(family: Family, mutations: Mutations, lengths: usize) -> Self {
+        Self {
+            chains: (0..lengths).map(|_| None).collect(),
+            family,
+            mutations,
+            health: Health::default(),
+            proposal: FullPath::default(),
+            tries: Tries::default(),
+            jumps: JumpMemory::default(),
+            controlled: ControlledMemory::default(),
+        }
+    }
+
+    /// The path that was found last.
+    pub(super) fn take_proposal(&mut self) -> FullPath {
+        std::mem::take(&mut self.proposal)
+    }
+
+    /// The path of the state's proposal, whose technique a number of the state chooses.
+    pub(super) fn find(
+        &mut self,
+        scene: &Caster<'_>,
+        tracer: Tracer,
+        state: &mut ChainState,
+        stream: &mut Stream,
+    ) -> Option<Found> {
+        let s = tracer.technique(state.row(Tracer::TECHNIQUE_ROW, stream)[0]);
+        tracer.find(scene, s, state, stream, &mut self.proposal, &mut self.health)
+    }
+
+    /// Runs each chain for the lane's part of the mutations. The first `mutations % LANES` turns take one more.
+    pub(super) fn run(
+        &mut self,
+        scene: &Scene,
+        kernel: &Kernel,
+        plan: &[Share],
+        turn: u64,
+        size: [usize; 2],
+    ) -> Job {
+        let (caster, mut splats) = (Caster::new(scene), Splats::new(size));
+        let mut chains = std::mem::take(&mut self.chains);
+        let run = |(chain, share): (&mut Option<Chain>, &Share)| {
+            let mut large_steps = Mean::default();
+            let mutations = share.mutations / LANES as u64 + u64::from(turn < share.mutations % LANES as u64);
+            let mut target = Target { splats: &mut splats, kernel, worth: share.worth };
+            if let Some(chain) = chain {
+                for _ in 0..mutations {
+                    self.mutate(&caster, share.tracer, chain, &mut target, &mut large_steps);
+                }
+            }
+            large_steps
+        };
+        let large_steps = chains.iter_mut().zip(plan).map(run).collect();
+        self.chains = chains;
+        Job { splats, rays: caster.rays(), large_steps, health: std::mem::take(&mut self.health) }
+    }
+
+    /// One mutation; both states are splatted with their expected weight.
+    fn mutate(
+        &mut self,
+        scene: &Caster<'_>,
+        tracer: Tracer,
+        chain: &mut Chain,
+        target: &mut Target<'_>,
+        large_steps: &mut Mean,
+    ) {
+        let kind = chain.stream.number();
+        let large = self.mutations.large_step.unwrap_or(LARGE_STEP);
+        if kind < large {
+            match self.mutations.tries(tracer.edges) {
+                true => self.try_all(scene, tracer, chain, target, large_steps),
+                false => self.large_step(scene, tracer, chain, target, large_steps),
+            }
+            return;
+        }
+        if self.family == Family::Jumping {
+            let separate = self.mutations.jumps == Jumps::Separate;
+            if !separate || kind < large + self.mutations.jump {
+                self.jump(scene, chain);
+            }
+            if separate && kind < large + self.mutations.jump {
+                target.splat(&chain.current, 1.0);
+                return;
+            }
+        }
+        self.small_step(scene, tracer, chain, target);
+    }
+
+    /// Another technique for the same path.
+    fn jump(&mut self, scene: &Scene, chain: &mut Chain) {
+        let Chain { state, stream, current, path, .. } = chain;
+        match jump(scene, path, current, state, stream, &mut self.jumps) {
+            Jump::Stayed => {}
+            Jump::Moved => chain.tally(CHANGE, true),
+            Jump::Failed => {
+                chain.tally(CHANGE, false);
+                chain.failed += 1;
+            }
+        }
+    }
+
+    fn large_step(
+        &mut self,
+        scene: &Caster<'_>,
+        tracer: Tracer,
+        chain: &mut Chain,
+        target: &mut Target<'_>,
+        large_steps: &mut Mean,
+    ) {
+        chain.state.propose(true);
+        let proposal = self.find(scene, tracer, &mut chain.state, &mut chain.stream);
+        let luminance = proposal.map_or(0.0, |found| found.luminance);
+        large_steps.add(luminance);
+        let ratio = luminance / chain.current.luminance;
+        self.decide(chain, LARGE, proposal, ratio, target);
+    }
+
+    fn small_step(&mut self, scene: &Caster<'_>, tracer: Tracer, chain: &mut Chain, target: &mut Target<'_>) {
+        chain.state.propose(false);
+        let Chain { state, stream, current, path, .. } = chain;
+        let mut correction = 1.0;
+        let proposal = if self.mutations.controlled {
+            let Self { proposal, health, controlled, .. } = self;
+            let found = controlled_step(tracer, scene, (path, current), state, stream, proposal, health, controlled);
+            found.map(|(found, ratio)| {
+                correction = ratio;
+                found
+            })
+        } else {
+            match self.family {
+                Family::Multiplexed => self.find(scene, tracer, state, stream),
+                Family::Jumping => {
+                    tracer.find(scene, current.technique, state, stream, &mut self.proposal, &mut self.health)
+                }
+            }
+        };
+        let luminance = proposal.map_or(0.0, |found| found.luminance);
+        let ratio = correction * luminance / chain.current.luminance;
+        self.decide(chain, SMALL, proposal, ratio, target);
+    }
+
+    /// A large step among all techniques.
+    fn try_all(
+        &mut self,
+        scene: &Caster<'_>,
+        tracer: Tracer,
+        chain: &mut Chain,
+        target: &mut Target<'_>,
+        large_steps: &mut Mean,
+    ) {
+        let Chain { state, stream, current, .. } = chain;
+        let known = Some(current.technique);
+        let before = current.luminance + self.tries.sum(tracer, scene, known, state, stream, &mut self.health);
+        state.propose(true);
+        let sum = self.tries.sum(tracer, scene, None, state, stream, &mut self.health);
+        large_steps.add(sum / tracer.techniques() as f64);
+        let proposal = self.tries.choose(tracer, stream, &mut self.proposal);
+        if let (Some(found), Family::Multiplexed) = (&proposal, self.family) {
+            let number = (found.technique as f64 + stream.number()) / tracer.techniques() as f64;
+            state.set(Tracer::TECHNIQUE_ROW, [number, 0.0, 0.0, 0.0]);
+        }
+        self.decide(chain, LARGE, proposal, sum / before, target);
+    }
+
+    /// Accepts or rejects the proposal, whose acceptance is `ratio`.
+    #[inline]
+    fn decide(
+        &mut self,
+        chain: &mut Chain,
+        kind: usize,
+        proposal: Option<Found>,
+        ratio: f64,
+        target: &mut Target<'_>,
+    ) {
+        let acceptance = if proposal.is_some() { ratio.min(1.0) } else { 0.0 };
+        target.splat(&chain.current, 1.0 - acceptance);
+        let accepted = chain.stream.number() < acceptance;
+        chain.tally(kind, accepted);
+        if let Some(found) = &proposal {
+            target.splat(found, acceptance);
+            if kind == SMALL && found.technique != chain.current.technique {
+                chain.tally(CHANGE, accepted);
+            }
+        }
+        match proposal.filter(|_| accepted) {
+            Some(found) => {
+                chain.current = found;
+                chain.state.accept();
+                std::mem::swap(&mut chain.path, &mut self.proposal);
+            }
+            None => chain.state.reject(),
+        }
+    }
+}

@@ -1,0 +1,242 @@
+//! Multiplexed Metropolis light transport (Hachisuka, Kaplanyan and Dachsbacher 2014; Bitterli 2015, section 3.8), and with
+//! reversible jumps between techniques (Bitterli et al. 2017).
+//!
+//! One family of chains per path length k, each with the target of [`crate::markov`], whose mean is b_k, the mean luminance
+//! of the image of length k. b_k comes from independent samples at the start and from every large step since.
+//!
+//! In `mmlt` a number of the state chooses the technique, and moves in small steps like the others. In `rjmlt` the
+//! technique stands apart: small steps keep it, and jumps change it without changing the path.
+//!
+//! Light seen directly is rendered by path tracing, and so is direct light unless the settings say otherwise, as in both
+//! papers.
+
+mod lane;
+
+use super::{Acceptance, ChainReport, Counts, path::Path, render::Settings};
+use crate::film::{Film, Splats};
+use crate::markov::{ChainState, Mutations, Scales, Tracer};
+use crate::math::{Discrete, Stream, Walk};
+use crate::scene::{Caster, Scene};
+use lane::{Chain, Job, Lane};
+use rayon::prelude::*;
+use std::ops::RangeInclusive;
+use std::sync::Arc;
+
+/// Chains per path length. Each lane owns one of each length, its random streams and its splats.
+const LANES: usize = 16;
+
+/// Independent samples of the first batch, over all lengths: two per pixel, within these bounds. Large steps refine what
+/// they find, and lengths without light get another batch in each pass, so that they need not be many.
+const BATCH_SAMPLES: RangeInclusive<usize> = 20_000..=200_000;
+
+/// Where a chain has its technique from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Family {
+    /// From a number of the state: `mmlt`.
+    Multiplexed,
+    /// From jumps: `rjmlt`.
+    Jumping,
+}
+
+/// Independent samples of a target: what tells b_k.
+#[derive(Clone, Copy, Debug, Default)]
+struct Mean {
+    sum: f64,
+    squares: f64,
+    samples: u64,
+}
+
+impl Mean {
+    fn add(&mut self, target: f64) {
+        self.sum += target;
+        self.squares += target * target;
+        self.samples += 1;
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.sum += other.sum;
+        self.squares += other.squares;
+        self.samples += other.samples;
+    }
+
+    fn mean(&self) -> f64 {
+        if self.samples == 0 { 0.0 } else { self.sum / self.samples as f64 }
+    }
+
+    /// Standard error of the mean.
+    fn error(&self) -> f64 {
+        let (n, mean) = (self.samples.max(1) as f64, self.mean());
+        ((self.squares / n - mean * mean).max(0.0) / n).sqrt()
+    }
+}
+
+/// One path length.
+struct Length {
+    tracer: Tracer,
+    scales: Arc<[Scales]>,
+    mean: Mean,
+    /// Batches of independent samples drawn.
+    batches: u64,
+}
+
+/// What a pass does with one length.
+struct Share {
+    tracer: Tracer,
+    /// Mutations by all lanes together; 0 for a length in which no light has been found yet.
+    mutations: u64,
+    /// What one of them is worth: b_k over their number, in units of a pixel's mean.
+    worth: f64,
+}
+
+/// The method with its chains.
+pub(super) struct Mmlt {
+    seed: u64,
+    mutations: Mutations,
+    direct: Path,
+    /// Samples per length in a batch.
+    batch: usize,
+    lengths: Vec<Length>,
+    lanes: Vec<Lane>,
+}
+
+impl Mmlt {
+    pub(super) fn start(scene: &Scene, settings: &Settings, family: Family) -> Self {
+        let mutations = settings.mutations;
+        let direct = if mutations.separate_direct { 2 } else { 1 };
+        let size = scene.camera.size;
+        let lengths: Vec<Length> = (direct + 1..=settings.max_depth)
+            .map(|edges| {
+                let tracer = Tracer { edges };
+                let scales = scales(tracer, &mutations, size);
+                Length { tracer, scales, mean: Mean::default(), batches: 0 }
+            })
+            .collect();
+        let samples = (2 * size[0] * size[1]).clamp(*BATCH_SAMPLES.start(), *BATCH_SAMPLES.end());
+        Self {
+            seed: settings.seed,
+            mutations,
+            direct: Path::up_to(settings, direct),
+            batch: samples.div_ceil(lengths.len().max(1)),
+            lanes: (0..LANES).map(|_| Lane::new(family, mutations, lengths.len())).collect(),
+            lengths,
+        }
+    }
+
+    /// Draws a batch of independent samples of a length in which no light has been found; starts its chains where one
+    /// finds some.
+    fn explore(&mut self, scene: &Scene, index: usize) {
+        let length = &mut self.lengths[index];
+        let (tracer, batches, edges) = (length.tracer, length.batches, length.tracer.edges as u64);
+        let key = |sample: usize| [2, edges, batches, sample as u64];
+        let state = ChainState::new(self.mutations.small_step, length.scales.clone());
+        let targets = explore(scene, tracer, &state, self.batch, |sample| Stream::new(self.seed, &key(sample)));
+        length.batches += 1;
+        targets.iter().for_each(|target| length.mean.add(*target));
+        let Some(choice) = Discrete::new(&targets) else { return };
+        let caster = Caster::new(scene);
+        for (number, lane) in self.lanes.iter_mut().enumerate() {
+            let mut stream = Stream::new(self.seed, &[3, edges, number as u64]);
+            let (chosen, _) = choice.sample(stream.number());
+            let (mut state, mut draws) = (state.clone(), Stream::new(self.seed, &key(chosen)));
+            let current = lane.find(&caster, tracer, &mut state, &mut draws);
+            state.accept();
+            lane.chains[index] = current.map(|current| Chain::new(state, stream, current, lane.take_proposal()));
+        }
+    }
+
+    /// How this pass divides one mutation per pixel among the lengths: in proportion to their light.
+    fn plan(&self, pixels: f64) -> Vec<Share> {
+        let total: f64 = self.lengths.iter().map(|length| length.mean.mean()).sum();
+        let share = |length: &Length| {
+            let b = length.mean.mean();
+            let mutations = if b > 0.0 { (b / total * pixels).ceil() } else { 0.0 };
+            Share { tracer: length.tracer, mutations: mutations as u64, worth: b * pixels / mutations.max(1.0) }
+        };
+        self.lengths.iter().map(share).collect()
+    }
+
+    pub(super) fn pass(&mut self, scene: &Scene, film: &mut Film, pass: u64, counts: &mut Counts) {
+        self.direct.pass(scene, film, pass, counts);
+        for index in 0..self.lengths.len() {
+            if self.lengths[index].mean.sum == 0.0 {
+                self.explore(scene, index);
+            }
+        }
+        let (kernel, size) = (film.kernel.clone(), film.size);
+        let plan = self.plan((size[0] * size[1]) as f64);
+        let jobs: Vec<Job> = self
+            .lanes
+            .par_iter_mut()
+            .enumerate()
+            .map(|(number, lane)| {
+                // What does not divide evenly goes round the lanes from pass to pass.
+                let turn = (number as u64 + pass) % LANES as u64;
+                lane.run(scene, &kernel, &plan, turn, size)
+            })
+            .collect();
+        for job in &jobs {
+            film.report(&job.health);
+            for (length, found) in self.lengths.iter_mut().zip(&job.large_steps) {
+                length.mean.merge(found);
+            }
+        }
+        counts.add(plan.iter().map(|share| share.mutations).sum(), jobs.iter().map(|job| job.rays).sum());
+        let splats: Vec<Splats> = jobs.into_iter().map(|job| job.splats).collect();
+        film.splat(&splats);
+        self.report(counts);
+    }
+
+    /// What the chains have done so far, summed over the lanes.
+    fn report(&self, counts: &mut Counts) {
+        let chains = |index: usize| self.lanes.iter().filter_map(move |lane| lane.chains[index].as_ref());
+        for (kind, name) in lane::KINDS.into_iter().enumerate() {
+            let sum = |(index, length): (usize, &Length)| {
+                let tallies = chains(index).map(|chain| chain.tallies[kind]);
+                let [proposed, accepted] = tallies.fold([0; 2], |[a, b], tally| [a + tally[0], b + tally[1]]);
+                Acceptance { length: length.tracer.edges, proposed, accepted }
+            };
+            counts.acceptance.insert(name, self.lengths.iter().enumerate().map(sum).collect());
+        }
+        let report = |(index, length): (usize, &Length)| ChainReport {
+            length: Some(length.tracer.edges),
+            mean: length.mean.mean(),
+            standard_error: length.mean.error(),
+            chains: chains(index).count(),
+            failed_inversions: chains(index).map(|chain| chain.failed).sum(),
+        };
+        counts.chains = self.lengths.iter().enumerate().map(report).collect();
+    }
+}
+
+/// How far the numbers of each row of a state move.
+fn scales(tracer: Tracer, mutations: &Mutations, size: [usize; 2]) -> Arc<[Scales]> {
+    let technique = [1.0, 0.0, 0.0, 0.0];
+    let walk = |walk| (0..=tracer.edges).map(move |index| mutations.scales(walk, index, size, false));
+    let rows = std::iter::once(technique).chain(walk(Walk::FromCamera)).chain(walk(Walk::FromLight));
+    rows.collect()
+}
+
+/// Targets of independent samples, each from its own stream.
+fn explore(
+    scene: &Scene,
+    tracer: Tracer,
+    state: &ChainState,
+    samples: usize,
+    stream: impl Fn(usize) -> Stream + Sync,
+) -> Vec<f64> {
+    const CHUNK: usize = 256;
+    let chunks: Vec<Vec<f64>> = (0..samples.div_ceil(CHUNK))
+        .into_par_iter()
+        .map(|chunk| {
+            let caster = Caster::new(scene);
+            let mut lane = Lane::new(Family::Multiplexed, Mutations::default(), 0);
+            let mut state = state.clone();
+            let one = |sample| {
+                state.reset();
+                lane.find(&caster, tracer, &mut state, &mut stream(sample)).map_or(0.0, |found| found.luminance)
+            };
+            (chunk * CHUNK..samples.min((chunk + 1) * CHUNK)).map(one).collect()
+        })
+        .collect();
+    chunks.concat()
+}

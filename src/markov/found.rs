@@ -1,0 +1,126 @@
+//! From a state to its path.
+
+use super::state::ChainState;
+use crate::film::{Health, PathClass};
+use crate::math::{Row, Stream};
+use crate::paths::{FullPath, Heuristic, Rows, Techniques, connect, trace_camera, trace_light};
+use crate::scene::Caster;
+use crate::spectrum::Spectrum;
+use glam::DVec2;
+
+/// The primary samples of a path do not know where its light is to arrive: lights are chosen by power.
+pub const TECHNIQUES: Techniques = Techniques::connections(Heuristic::Power);
+
+/// No vertex is the last by chance.
+const NEVER: usize = usize::MAX;
+
+/// A path as the film and the chain see it.
+#[derive(Clone, Copy, Debug)]
+pub struct Found {
+    /// Weighted contribution over density, times the number of techniques.
+    pub value: Spectrum,
+    /// Luminance of `value`: the chain's target.
+    pub luminance: f64,
+    /// Its class.
+    pub class: PathClass,
+    /// Film position.
+    pub film: DVec2,
+    /// Light vertices of the technique.
+    pub technique: usize,
+}
+
+/// Finds paths of one length. The rows of a state are one for the choice of the technique, those of the camera's walk, and
+/// those of the light's.
+#[derive(Clone, Copy, Debug)]
+pub struct Tracer {
+    /// Length of the paths, k.
+    pub edges: usize,
+}
+
+impl Tracer {
+    /// Row of the technique choice.
+    pub const TECHNIQUE_ROW: usize = 0;
+    /// First row of the camera's walk.
+    pub const CAMERA_ROWS: usize = 1;
+
+    /// First row of the light's walk.
+    pub fn light_rows(self) -> usize {
+        Self::CAMERA_ROWS + self.edges + 1
+    }
+
+    /// Number of rows.
+    pub fn rows(self) -> usize {
+        self.light_rows() + self.edges + 1
+    }
+
+    /// Number of techniques.
+    pub fn techniques(self) -> usize {
+        self.edges + 1
+    }
+
+    /// The technique that `number` chooses.
+    pub fn technique(self, number: f64) -> usize {
+        ((number * self.techniques() as f64) as usize).min(self.edges)
+    }
+
+    /// The path of technique `s`, left in `path`; `None` where it carries no light.
+    #[inline]
+    pub fn find(
+        self,
+        scene: &Caster<'_>,
+        s: usize,
+        state: &mut ChainState,
+        stream: &mut Stream,
+        path: &mut FullPath,
+        health: &mut Health,
+    ) -> Option<Found> {
+        let t = self.techniques() - s;
+        let first = state.row(Self::CAMERA_ROWS, stream);
+        self.walk_camera(scene, first, &mut state.rows(Self::CAMERA_ROWS, false, stream), t, path)?;
+        self.walk_light(scene, &mut state.rows(self.light_rows(), false, stream), s, path)?;
+        self.connect(scene, path, health)
+    }
+
+    /// The camera subpath of `t` vertices.
+    #[inline]
+    pub(super) fn walk_camera(
+        self,
+        scene: &Caster<'_>,
+        first: Row,
+        rows: &mut impl Rows,
+        t: usize,
+        path: &mut FullPath,
+    ) -> Option<()> {
+        path.film = DVec2::new(first[0] * scene.camera.size[0] as f64, first[1] * scene.camera.size[1] as f64);
+        trace_camera(scene, path.film, first, rows, t, NEVER, &mut path.camera);
+        (path.camera.vertices.len() == t).then_some(())
+    }
+
+    /// The light subpath of `s` vertices.
+    #[inline]
+    pub(super) fn walk_light(
+        self,
+        scene: &Caster<'_>,
+        rows: &mut impl Rows,
+        s: usize,
+        path: &mut FullPath,
+    ) -> Option<()> {
+        trace_light(scene, rows, s, NEVER, &mut path.light);
+        (path.light.vertices.len() == s).then_some(())
+    }
+
+    /// What the two subpaths make together.
+    #[inline]
+    pub(super) fn connect(self, scene: &Caster<'_>, path: &mut FullPath, health: &mut Health) -> Option<Found> {
+        let found = connect(scene, &path.light.vertices, &path.camera.vertices, &TECHNIQUES)?;
+        let value = found.value * self.techniques() as f64;
+        let luminance = value.luminance();
+        if !(health.accepts(value) && luminance > 0.0) {
+            return None;
+        }
+        path.film = found.film.unwrap_or(path.film);
+        path.junction = found.junction;
+        let (film, technique) = (path.film, path.light.vertices.len());
+        Some(Found { value, luminance, class: found.class, film, technique })
+    }
+}

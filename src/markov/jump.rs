@@ -1,0 +1,114 @@
+//! The reversible jump: another technique for the same path (Bitterli et al. 2017, sections 4 to 6; Bitterli 2015, section
+//! 5.2.1).
+//!
+//! From (i, u) to (j, v) with S_j(v) = S_i(u) = x. Technique j is drawn with the probability w_j(x), whatever i is. The
+//! Jacobian of the jump is p_j / p_i, since rows are inverted with the density of their walk, and with C_i = w_i f / p_i
+//! the acceptance is
+//!
+//! ```text
+//! C_j w_i p_j / (C_i w_j p_i) = (w_j f / p_j) w_i p_j / ((w_i f / p_i) w_j p_i) = 1.
+//! ```
+//!
+//! No ray is cast: the new target follows from the old one by the ratio of the densities. Rows of vertices that change
+//! hands are inverted; rows that are no longer read may have any value, so that they are drawn anew. To keep them as they
+//! are would tie them to the path: the mistake of a fixed point in an ambiguous interval.
+
+use super::found::{Found, TECHNIQUES, Tracer};
+use super::state::ChainState;
+use crate::math::{Row, Stream};
+use crate::paths::{FullPath, Heuristic};
+use crate::scene::Scene;
+
+/// How a jump has ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Jump {
+    /// The same technique was drawn.
+    Stayed,
+    /// The technique has changed.
+    Moved,
+    /// The new technique's rows could not be found, by rounding.
+    Failed,
+}
+
+/// Has the state jump to a technique drawn by the weights. `found` is what `path` is now, `memory` is any.
+pub fn jump(
+    scene: &Scene,
+    path: &FullPath,
+    found: &mut Found,
+    state: &mut ChainState,
+    stream: &mut Stream,
+    memory: &mut JumpMemory,
+) -> Jump {
+    let heuristic = TECHNIQUES.heuristic.unwrap_or(Heuristic::Power);
+    let JumpMemory { densities, rows } = memory;
+    path.densities(densities);
+    let total: f64 = densities.iter().map(|density| heuristic.apply(*density)).sum();
+    let mut rest = stream.number() * total;
+    let chosen = densities.iter().position(|density| {
+        rest -= heuristic.apply(*density);
+        rest < 0.0
+    });
+    let from = found.technique;
+    // By rounding the last weight may not be reached.
+    let to = chosen.unwrap_or(from);
+    if to == from {
+        return Jump::Stayed;
+    }
+    rows.clear();
+    if invert(scene, path, from, to, stream, rows).is_none() {
+        return Jump::Failed;
+    }
+    forget(path, from, to, state, stream);
+    rows.iter().for_each(|(index, row)| state.set(*index, *row));
+    // What a technique contributes is its weight over its density.
+    let share = |technique: usize| heuristic.apply(densities[technique]) / densities[technique];
+    let factor = share(to) / share(from);
+    *found = Found { value: found.value * factor, luminance: found.luminance * factor, technique: to, ..*found };
+    Jump::Moved
+}
+
+/// Memory that jumps share.
+#[derive(Debug, Default)]
+pub struct JumpMemory {
+    densities: Vec<f64>,
+    rows: Vec<(usize, Row)>,
+}
+
+/// The rows that technique `to` reads and `from` does not.
+pub(super) fn invert(
+    scene: &Scene,
+    path: &FullPath,
+    from: usize,
+    to: usize,
+    stream: &mut Stream,
+    rows: &mut Vec<(usize, Row)>,
+) -> Option<()> {
+    let tracer = Tracer { edges: path.edges() };
+    for m in from..to {
+        rows.push((tracer.light_rows() + m, path.light_row(scene, m, stream.row())?));
+    }
+    // Camera vertex c is x_{k-c}; it is found by row c - 1.
+    for m in to..from {
+        let c = tracer.edges - m;
+        rows.push((Tracer::CAMERA_ROWS + c - 1, path.camera_row(scene, c, stream.row())?));
+    }
+    Some(())
+}
+
+/// Forgets the rows that technique `from` reads and `to` does not.
+fn forget(path: &FullPath, from: usize, to: usize, state: &mut ChainState, stream: &mut Stream) {
+    let tracer = Tracer { edges: path.edges() };
+    for m in to..from {
+        state.forget(tracer.light_rows() + m);
+    }
+    for m in from..to {
+        let row = Tracer::CAMERA_ROWS + tracer.edges - m - 1;
+        if row > Tracer::CAMERA_ROWS {
+            state.forget(row);
+        } else {
+            // The lens is still read.
+            let [_, _, u, v] = state.row(row, stream);
+            state.set(row, [stream.number(), stream.number(), u, v]);
+        }
+    }
+}
