@@ -5,6 +5,7 @@ mod blend;
 mod compare;
 mod import;
 mod merge;
+mod mutations;
 mod progress;
 mod reference;
 mod render;

@@ -1,5 +1,6 @@
 //! `pathblend render`.
 
+use super::mutations::MutationArguments;
 use super::progress::Reporter;
 use super::{SceneArguments, check_output, on_threads, parse_time, say};
 use crate::image::{Precision, WriteOptions, write_png};
@@ -34,6 +35,8 @@ pub(super) struct Render {
     threads: Option<usize>,
     #[command(flatten)]
     tuning: Tuning,
+    #[command(flatten)]
+    chains: MutationArguments,
     /// Image to write: OpenEXR with one layer per path class.
     #[arg(short, long, value_name = "OUT.exr")]
     output: PathBuf,
@@ -61,7 +64,7 @@ pub(super) struct Tuning {
     /// How techniques are weighted against each other: path, bdpt, sppm, vcm.
     #[arg(long, value_enum, default_value_t = Heuristic::Power)]
     heuristic: Heuristic,
-    /// How lights are chosen for direct light: all but light and mmlt.
+    /// How lights are chosen for direct light: path, bdpt, sppm, vcm.
     #[arg(long, value_enum, default_value_t = LightChoice::Position)]
     lights: LightChoice,
     /// Light subpaths per pass, up to 16777216: sppm, vcm. Default: one per pixel, up to 1048576 (vcm: 131072).
@@ -106,13 +109,15 @@ impl Render {
         if let Some(png) = &self.png {
             check_output(png, "png", &[])?;
         }
+        let mutations = self.chains.mutations()?;
         let scene = self.scene.load()?;
         let budget = match (self.passes, self.time) {
             (Some(passes), _) => Budget::Passes(passes),
             (None, time) => Budget::Wall(time.unwrap_or(DEFAULT_TIME)),
         };
         let (seed, max_depth, features) = (self.seed, scene.max_depth, !self.no_features);
-        let settings = self.tuning.applied(Settings { seed, max_depth, features, budget, ..Settings::default() });
+        let given = Settings { seed, max_depth, features, budget, mutations, ..Settings::default() };
+        let settings = self.tuning.applied(given);
         if self.integrator == Method::Sppm && !scene.gathers() {
             eprintln!("warning: nothing in the scene scatters diffuse-like, so sppm has nowhere to gather photons");
         }

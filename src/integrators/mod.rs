@@ -4,6 +4,7 @@
 //! A new method: its file with `start` and `pass`, and one arm in each match below.
 
 mod bdpt;
+mod chains;
 mod checkpoint;
 mod grid;
 mod light;
@@ -11,6 +12,7 @@ mod merge;
 mod mmlt;
 mod path;
 mod photons;
+mod pssmlt;
 mod reference;
 mod render;
 mod sppm;
@@ -41,6 +43,8 @@ pub enum Method {
     Sppm,
     /// Vertex connection and merging.
     Vcm,
+    /// Metropolis light transport in the primary sample space of bidirectional path tracing.
+    Pssmlt,
     /// Multiplexed Metropolis light transport.
     Mmlt,
     /// The same with reversible jumps between techniques.
@@ -56,6 +60,7 @@ impl Method {
             Self::Bdpt => "bdpt",
             Self::Sppm => "sppm",
             Self::Vcm => "vcm",
+            Self::Pssmlt => "pssmlt",
             Self::Mmlt => "mmlt",
             Self::Rjmlt => "rjmlt",
         }
@@ -65,7 +70,7 @@ impl Method {
     pub fn resumes(self) -> bool {
         match self {
             Self::Path | Self::Light | Self::Bdpt | Self::Sppm | Self::Vcm => true,
-            Self::Mmlt | Self::Rjmlt => false,
+            Self::Pssmlt | Self::Mmlt | Self::Rjmlt => false,
         }
     }
 }
@@ -73,7 +78,7 @@ impl Method {
 /// How often a kind of mutation was proposed and accepted, for one path length.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Acceptance {
-    /// Path length in edges.
+    /// Path length in edges; 0 for chains with paths of all lengths.
     pub length: usize,
     /// Proposals.
     pub proposed: u64,
@@ -97,9 +102,8 @@ pub struct Counts {
 /// Chains of one target.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ChainReport {
-    /// Length of their paths in edges; `None` where they have paths of all lengths.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub length: Option<usize>,
+    /// Length of their paths in edges; 0 where they have paths of all lengths.
+    pub length: usize,
     /// Mean of the target: the mean luminance of their image, b, by independent samples.
     pub mean: f64,
     /// Its standard error.
@@ -124,6 +128,7 @@ enum Integrator {
     Bdpt(bdpt::Bdpt),
     Sppm(sppm::Sppm),
     Vcm(vcm::Vcm),
+    Pssmlt(Box<pssmlt::Pssmlt>),
     Mmlt(Box<mmlt::Mmlt>),
 }
 
@@ -135,6 +140,7 @@ impl Integrator {
             Method::Bdpt => Self::Bdpt(bdpt::Bdpt::start(settings)),
             Method::Sppm => Self::Sppm(sppm::Sppm::start(scene, settings)),
             Method::Vcm => Self::Vcm(vcm::Vcm::start(scene, settings)),
+            Method::Pssmlt => Self::Pssmlt(Box::new(pssmlt::Pssmlt::start(scene, settings))),
             Method::Mmlt => Self::Mmlt(Box::new(mmlt::Mmlt::start(scene, settings, mmlt::Family::Multiplexed))),
             Method::Rjmlt => Self::Mmlt(Box::new(mmlt::Mmlt::start(scene, settings, mmlt::Family::Jumping))),
         }
@@ -144,7 +150,7 @@ impl Integrator {
     /// where they have walked to, so a render by chains must not go on from a film alone ([`Method::resumes`]).
     fn skip(&mut self, passes: u64) {
         match self {
-            Self::Path(_) | Self::Light(_) | Self::Bdpt(_) | Self::Mmlt(_) => {}
+            Self::Path(_) | Self::Light(_) | Self::Bdpt(_) | Self::Pssmlt(_) | Self::Mmlt(_) => {}
             Self::Sppm(sppm) => (0..passes).for_each(|pass| sppm.shrink(pass)),
             Self::Vcm(vcm) => (0..passes).for_each(|pass| vcm.shrink(pass)),
         }
@@ -158,6 +164,7 @@ impl Integrator {
             Self::Bdpt(bdpt) => bdpt.pass(scene, film, pass, counts),
             Self::Sppm(sppm) => sppm.pass(scene, film, pass, counts),
             Self::Vcm(vcm) => vcm.pass(scene, film, pass, counts),
+            Self::Pssmlt(pssmlt) => pssmlt.pass(scene, film, pass, counts),
             Self::Mmlt(mmlt) => mmlt.pass(scene, film, pass, counts),
         }
     }

@@ -211,7 +211,10 @@ mod tests {
         for (sum, expected) in squares.into_iter().zip(expected) {
             let variance = sum / f64::from(trials);
             // The standard error of a variance is at most √(2/n) of it.
-            assert!((variance / expected - 1.0).abs() < 4.5 * (2.0 / f64::from(trials)).sqrt(), "{variance} {expected}");
+            assert!(
+                (variance / expected - 1.0).abs() < 4.5 * (2.0 / f64::from(trials)).sqrt(),
+                "{variance} {expected}"
+            );
         }
     }
 }

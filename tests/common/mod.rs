@@ -137,19 +137,18 @@ pub fn room() -> Mesh {
 /// The image of `method` for each seed.
 #[track_caller]
 pub fn images(scene: &Scene, method: Method, passes: u64) -> Vec<Image> {
+    images_with(scene, method, SEEDS, Settings { budget: Budget::Passes(passes), ..Settings::default() })
+}
+
+/// The image of `method` for each of `seeds` seeds, with the scene's depth and else with `settings`.
+#[track_caller]
+pub fn images_with(scene: &Scene, method: Method, seeds: u64, settings: Settings) -> Vec<Image> {
     let one = |seed| {
-        let settings = Settings {
-            seed,
-            max_depth: scene.max_depth,
-            features: true,
-            budget: Budget::Passes(passes),
-            ..Settings::default()
-        };
-        let outcome = render(scene, method, &settings, |_| {});
+        let outcome = render(scene, method, &Settings { seed, max_depth: scene.max_depth, ..settings }, |_| {});
         assert_eq!(outcome.health, Default::default(), "{method:?} made invalid contributions");
         outcome.image
     };
-    (0..SEEDS).map(one).collect()
+    (0..seeds).map(one).collect()
 }
 
 /// Mean and standard error of `value` over the images.

@@ -1,6 +1,7 @@
 //! The chains of one lane, and what they do in a pass.
 
-use super::{Family, LANES, Mean, Share};
+use super::super::chains::{LANES, LARGE_STEP, Mean};
+use super::{Family, Share};
 use crate::film::{Health, Kernel, Splats};
 use crate::markov::{
     ChainState, ControlledMemory, Found, Jump, JumpMemory, Jumps, Mutations, Tracer, Tries, controlled_step, jump,
@@ -8,9 +9,6 @@ use crate::markov::{
 use crate::math::Stream;
 use crate::paths::FullPath;
 use crate::scene::{Caster, Scene};
-
-/// Probability of a large step where none is given.
-const LARGE_STEP: f64 = 0.3;
 
 /// Names of the tallies.
 pub(super) const KINDS: [&str; 3] = ["large_step", "small_step", "technique_change"];
@@ -113,14 +111,7 @@ impl Lane {
     }
 
     /// Runs each chain for the lane's part of the mutations. The first `mutations % LANES` turns take one more.
-    pub(super) fn run(
-        &mut self,
-        scene: &Scene,
-        kernel: &Kernel,
-        plan: &[Share],
-        turn: u64,
-        size: [usize; 2],
-    ) -> Job {
+    pub(super) fn run(&mut self, scene: &Scene, kernel: &Kernel, plan: &[Share], turn: u64, size: [usize; 2]) -> Job {
         let (caster, mut splats) = (Caster::new(scene), Splats::new(size));
         let mut chains = std::mem::take(&mut self.chains);
         let run = |(chain, share): (&mut Option<Chain>, &Share)| {
@@ -248,14 +239,7 @@ impl Lane {
 
     /// Accepts or rejects the proposal, whose acceptance is `ratio`.
     #[inline]
-    fn decide(
-        &mut self,
-        chain: &mut Chain,
-        kind: usize,
-        proposal: Option<Found>,
-        ratio: f64,
-        target: &mut Target<'_>,
-    ) {
+    fn decide(&mut self, chain: &mut Chain, kind: usize, proposal: Option<Found>, ratio: f64, target: &mut Target<'_>) {
         let acceptance = if proposal.is_some() { ratio.min(1.0) } else { 0.0 };
         target.splat(&chain.current, 1.0 - acceptance);
         let accepted = chain.stream.number() < acceptance;

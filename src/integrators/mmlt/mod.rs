@@ -12,6 +12,7 @@
 
 mod lane;
 
+use super::chains::{LANES, Mean, first_samples, independent};
 use super::{Acceptance, ChainReport, Counts, path::Path, render::Settings};
 use crate::film::{Film, Splats};
 use crate::markov::{ChainState, Mutations, Scales, Tracer};
@@ -19,15 +20,7 @@ use crate::math::{Discrete, Stream, Walk};
 use crate::scene::{Caster, Scene};
 use lane::{Chain, Job, Lane};
 use rayon::prelude::*;
-use std::ops::RangeInclusive;
 use std::sync::Arc;
-
-/// Chains per path length. Each lane owns one of each length, its random streams and its splats.
-const LANES: usize = 16;
-
-/// Independent samples of the first batch, over all lengths: two per pixel, within these bounds. Large steps refine what
-/// they find, and lengths without light get another batch in each pass, so that they need not be many.
-const BATCH_SAMPLES: RangeInclusive<usize> = 20_000..=200_000;
 
 /// Where a chain has its technique from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,38 +29,6 @@ pub(super) enum Family {
     Multiplexed,
     /// From jumps: `rjmlt`.
     Jumping,
-}
-
-/// Independent samples of a target: what tells b_k.
-#[derive(Clone, Copy, Debug, Default)]
-struct Mean {
-    sum: f64,
-    squares: f64,
-    samples: u64,
-}
-
-impl Mean {
-    fn add(&mut self, target: f64) {
-        self.sum += target;
-        self.squares += target * target;
-        self.samples += 1;
-    }
-
-    fn merge(&mut self, other: &Self) {
-        self.sum += other.sum;
-        self.squares += other.squares;
-        self.samples += other.samples;
-    }
-
-    fn mean(&self) -> f64 {
-        if self.samples == 0 { 0.0 } else { self.sum / self.samples as f64 }
-    }
-
-    /// Standard error of the mean.
-    fn error(&self) -> f64 {
-        let (n, mean) = (self.samples.max(1) as f64, self.mean());
-        ((self.squares / n - mean * mean).max(0.0) / n).sqrt()
-    }
 }
 
 /// One path length.
@@ -111,12 +72,11 @@ impl Mmlt {
                 Length { tracer, scales, mean: Mean::default(), batches: 0 }
             })
             .collect();
-        let samples = (2 * size[0] * size[1]).clamp(*BATCH_SAMPLES.start(), *BATCH_SAMPLES.end());
         Self {
             seed: settings.seed,
             mutations,
             direct: Path::up_to(settings, direct),
-            batch: samples.div_ceil(lengths.len().max(1)),
+            batch: first_samples(size).div_ceil(lengths.len().max(1)),
             lanes: (0..LANES).map(|_| Lane::new(family, mutations, lengths.len())).collect(),
             lengths,
         }
@@ -129,7 +89,12 @@ impl Mmlt {
         let (tracer, batches, edges) = (length.tracer, length.batches, length.tracer.edges as u64);
         let key = |sample: usize| [2, edges, batches, sample as u64];
         let state = ChainState::new(self.mutations.small_step, length.scales.clone());
-        let targets = explore(scene, tracer, &state, self.batch, |sample| Stream::new(self.seed, &key(sample)));
+        let memory = || (Lane::new(Family::Multiplexed, self.mutations, 0), state.clone());
+        let targets = independent(scene, self.batch, memory, |caster, (lane, state), sample| {
+            state.reset();
+            let found = lane.find(caster, tracer, state, &mut Stream::new(self.seed, &key(sample)));
+            found.map_or(0.0, |found| found.luminance)
+        });
         length.batches += 1;
         targets.iter().for_each(|target| length.mean.add(*target));
         let Some(choice) = Discrete::new(&targets) else { return };
@@ -198,7 +163,7 @@ impl Mmlt {
             counts.acceptance.insert(name, self.lengths.iter().enumerate().map(sum).collect());
         }
         let report = |(index, length): (usize, &Length)| ChainReport {
-            length: Some(length.tracer.edges),
+            length: length.tracer.edges,
             mean: length.mean.mean(),
             standard_error: length.mean.error(),
             chains: chains(index).count(),
@@ -214,29 +179,4 @@ fn scales(tracer: Tracer, mutations: &Mutations, size: [usize; 2]) -> Arc<[Scale
     let walk = |walk| (0..=tracer.edges).map(move |index| mutations.scales(walk, index, size, false));
     let rows = std::iter::once(technique).chain(walk(Walk::FromCamera)).chain(walk(Walk::FromLight));
     rows.collect()
-}
-
-/// Targets of independent samples, each from its own stream.
-fn explore(
-    scene: &Scene,
-    tracer: Tracer,
-    state: &ChainState,
-    samples: usize,
-    stream: impl Fn(usize) -> Stream + Sync,
-) -> Vec<f64> {
-    const CHUNK: usize = 256;
-    let chunks: Vec<Vec<f64>> = (0..samples.div_ceil(CHUNK))
-        .into_par_iter()
-        .map(|chunk| {
-            let caster = Caster::new(scene);
-            let mut lane = Lane::new(Family::Multiplexed, Mutations::default(), 0);
-            let mut state = state.clone();
-            let one = |sample| {
-                state.reset();
-                lane.find(&caster, tracer, &mut state, &mut stream(sample)).map_or(0.0, |found| found.luminance)
-            };
-            (chunk * CHUNK..samples.min((chunk + 1) * CHUNK)).map(one).collect()
-        })
-        .collect();
-    chunks.concat()
 }

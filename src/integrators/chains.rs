@@ -1,0 +1,71 @@
+//! What methods with chains share.
+
+use crate::scene::{Caster, Scene};
+use rayon::prelude::*;
+use std::ops::RangeInclusive;
+
+/// Lanes of chains. Each owns its chains, their random streams and its splats, so that the image does not depend on the
+/// number of threads.
+pub(super) const LANES: usize = 16;
+
+/// Probability of a large step where none is given.
+pub(super) const LARGE_STEP: f64 = 0.3;
+
+/// Independent samples before the chains begin: two per pixel, within these bounds. Large steps refine what they find.
+const FIRST_SAMPLES: RangeInclusive<usize> = 20_000..=200_000;
+
+/// Independent samples before the chains begin, for a film of `size`.
+pub(super) fn first_samples(size: [usize; 2]) -> usize {
+    (2 * size[0] * size[1]).clamp(*FIRST_SAMPLES.start(), *FIRST_SAMPLES.end())
+}
+
+/// Independent samples of a target: what tells b_k.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Mean {
+    pub sum: f64,
+    squares: f64,
+    samples: u64,
+}
+
+impl Mean {
+    pub(super) fn add(&mut self, target: f64) {
+        self.sum += target;
+        self.squares += target * target;
+        self.samples += 1;
+    }
+
+    pub(super) fn merge(&mut self, other: &Self) {
+        self.sum += other.sum;
+        self.squares += other.squares;
+        self.samples += other.samples;
+    }
+
+    pub(super) fn mean(&self) -> f64 {
+        if self.samples == 0 { 0.0 } else { self.sum / self.samples as f64 }
+    }
+
+    /// Standard error of the mean.
+    pub(super) fn error(&self) -> f64 {
+        let (n, mean) = (self.samples.max(1) as f64, self.mean());
+        ((self.squares / n - mean * mean).max(0.0) / n).sqrt()
+    }
+}
+
+/// Targets of `samples` independent samples, in parallel. `memory` is what one thread needs, `one` gives the target of a
+/// sample by its number.
+pub(super) fn independent<M>(
+    scene: &Scene,
+    samples: usize,
+    memory: impl Fn() -> M + Sync,
+    one: impl Fn(&Caster<'_>, &mut M, usize) -> f64 + Sync,
+) -> Vec<f64> {
+    const CHUNK: usize = 256;
+    let chunks: Vec<Vec<f64>> = (0..samples.div_ceil(CHUNK))
+        .into_par_iter()
+        .map(|chunk| {
+            let (caster, mut memory) = (Caster::new(scene), memory());
+            (chunk * CHUNK..samples.min((chunk + 1) * CHUNK)).map(|i| one(&caster, &mut memory, i)).collect()
+        })
+        .collect();
+    chunks.concat()
+}

@@ -1,0 +1,131 @@
+//! Chains keep their distribution under each mutation alone. They start with it, by resampling independent paths; without
+//! large steps a mutation of wrong acceptance drives them away, and nothing brings them back.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use common::{Estimate, SIGMAS, build, diffuse, estimate, glass, images, images_with, pinhole, room};
+use glam::DVec3;
+use pathblend::bsdf::{Blend, Bsdf, Conductor, Distribution, RoughConductor, Roughness};
+use pathblend::geometry::Solid;
+use pathblend::image::{Image, Layer};
+use pathblend::integrators::{Budget, Method, Settings};
+use pathblend::markov::{FilmSteps, Jumps, LargeSteps, Mutations, SmallStep};
+use pathblend::scene::{Builder, Scene};
+use pathblend::spectrum::Spectrum;
+
+const SIZE: usize = 8;
+
+/// A room with a light under its ceiling, a ball of glass, and one of which a part is rough metal everywhere.
+fn scene() -> Scene {
+    let mut builder = Builder::new();
+    let wall = builder.bsdf(diffuse(0.6));
+    builder.mesh(room(), wall, None).unwrap();
+    let clear = builder.bsdf(glass(1.5));
+    builder.solid(Solid::sphere(DVec3::new(-0.4, -0.5, 0.1), 0.35), clear, None).unwrap();
+    let metal = Conductor { index: None, specular_reflectance: Spectrum::grey(0.9).into() };
+    let rough = RoughConductor { metal, roughness: Roughness::isotropic(Distribution::Ggx, 0.15) };
+    let nested = Box::new([diffuse(0.7), Bsdf::RoughConductor(rough)]);
+    let mixed = builder.bsdf(Bsdf::Blend(Blend { weight: 0.6.into(), nested }));
+    builder.solid(Solid::sphere(DVec3::new(0.45, -0.6, -0.2), 0.35), mixed, None).unwrap();
+    let lamp = Solid::disk(DVec3::new(0.2, 0.95, 0.0), -DVec3::Y, 0.4);
+    builder.solid(lamp, wall, Some(Spectrum::grey(5.0).into())).unwrap();
+    build(builder, pinhole(SIZE, 0.7, DVec3::new(0.0, 0.0, 0.95), -DVec3::Z), 5)
+}
+
+/// The light of one class in each quarter of the image.
+fn quarters(images: &[Image], class: &str) -> Vec<Estimate> {
+    let quarter = |image: &Image, [left, top]: [usize; 2]| match image.layers.get(class) {
+        Some(Layer::Luminance(layer)) => {
+            let inside = |y: usize, x: usize| (y < SIZE / 2) == (top == 0) && (x < SIZE / 2) == (left == 0);
+            let values = layer.indexed_iter().filter(|((y, x), _)| inside(*y, *x));
+            values.map(|(_, v)| f64::from(*v)).sum::<f64>() / (SIZE * SIZE) as f64
+        }
+        _ => 0.0,
+    };
+    [[0, 0], [1, 0], [0, 1], [1, 1]].map(|at| estimate(images, |image| quarter(image, at))).into()
+}
+
+/// Every mutation alone, and with jumps.
+fn cases() -> Vec<(&'static str, Method, Mutations)> {
+    let never = Mutations { large_step: Some(0.0), jump: 0.0, ..Mutations::default() };
+    let jumping = Mutations { jump: 0.3, ..never };
+    let tries = Mutations { large_step: Some(1.0), large_steps: LargeSteps::TriesFrom(0), ..never };
+    let kelemen = Mutations { small_step: SmallStep::KELEMEN, ..never };
+    vec![
+        ("small steps", Method::Mmlt, never),
+        ("Kelemen's steps", Method::Mmlt, kelemen),
+        ("Kelemen's steps and jumps", Method::Rjmlt, Mutations { jump: 0.3, ..kelemen }),
+        ("steps by pixels", Method::Mmlt, Mutations { film_steps: FilmSteps::Pixels(2.0), ..never }),
+        ("kept choices", Method::Mmlt, Mutations { keep_choices: true, ..never }),
+        ("controlled steps", Method::Mmlt, Mutations { controlled: true, ..never }),
+        ("controlled steps and jumps", Method::Rjmlt, Mutations { controlled: true, ..jumping }),
+        ("small steps without jumps", Method::Rjmlt, never),
+        ("small steps and jumps", Method::Rjmlt, jumping),
+        ("jumps before small steps", Method::Rjmlt, Mutations { jumps: Jumps::Always, ..never }),
+        ("jumps alone", Method::Rjmlt, Mutations { jump: 1.0, ..never }),
+        ("kept choices and jumps", Method::Rjmlt, Mutations { keep_choices: true, ..jumping }),
+        ("large steps", Method::Rjmlt, Mutations { large_step: Some(1.0), ..never }),
+        ("tries", Method::Mmlt, tries),
+        ("tries and jumps", Method::Rjmlt, Mutations { large_step: Some(0.5), jump: 0.5, ..tries }),
+        ("small steps of all lengths", Method::Pssmlt, never),
+        ("Kelemen's steps of all lengths", Method::Pssmlt, kelemen),
+        ("kept choices of all lengths", Method::Pssmlt, Mutations { keep_choices: true, ..never }),
+    ]
+}
+
+/// A class in one quarter of the image, and its light.
+struct Part {
+    class: String,
+    quarter: usize,
+    light: Estimate,
+}
+
+/// The parts that have a twenty-fifth of the light of their length at least: of a thousand chains forty begin there.
+fn parts(scene: &Scene) -> Vec<Part> {
+    let truth = images(scene, Method::Bdpt, 150);
+    let classes = truth[0].layers.keys().filter(|name| name.starts_with("path_"));
+    let part = |class: &String| {
+        let quarters = quarters(&truth, class).into_iter().enumerate();
+        quarters.map(|(quarter, light)| Part { class: class.clone(), quarter, light }).collect::<Vec<_>>()
+    };
+    let parts: Vec<Part> = classes.flat_map(part).collect();
+    let of_length = |length: usize| -> f64 {
+        parts.iter().filter(|part| part.class.len() == length).map(|part| part.light.mean).sum()
+    };
+    let totals: Vec<f64> = (0..20).map(of_length).collect();
+    parts.into_iter().filter(|part| part.light.mean > 0.04 * totals[part.class.len()]).collect()
+}
+
+#[test]
+fn mutations_keep_the_distribution() {
+    let scene = scene();
+    let parts = parts(&scene);
+    assert!(parts.len() > 16, "{} parts", parts.len());
+    let mut failures = Vec::new();
+    for (name, method, mutations) in cases() {
+        let passes = if method == Method::Pssmlt { 40 } else { 150 };
+        let settings = Settings { budget: Budget::Passes(passes), mutations, ..Settings::default() };
+        let found = images_with(&scene, method, 64, settings);
+        let mut worst = (0.0, String::new());
+        for Part { class, quarter, light } in &parts {
+            let own = quarters(&found, class)[*quarter];
+            let z = own.deviation(*light);
+            if z > worst.0 {
+                worst = (
+                    z,
+                    format!(
+                        "{class}, quarter {quarter}: {:.5} ± {:.5}, expected {:.5}",
+                        own.mean, own.error, light.mean
+                    ),
+                );
+            }
+        }
+        println!("| {name} | {} | {:.1} | {}", method.name(), worst.0, worst.1);
+        if worst.0 > SIGMAS {
+            failures.push(format!("{name}: {}", worst.1));
+        }
+    }
+    assert!(failures.is_empty(), "{failures:#?}");
+}
