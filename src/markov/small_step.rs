@@ -1,6 +1,7 @@
 //! Small steps: each number moves a little, around the circle.
 
-use crate::math::Stream;
+use super::settings::Scales;
+use crate::math::{Row, Stream};
 use serde::Serialize;
 use std::f64::consts::TAU;
 
@@ -38,7 +39,6 @@ impl SmallStep {
     pub const KELEMEN: Self = Self::Kelemen { least: 1.0 / 1024.0, most: 1.0 / 64.0 };
 
     /// `number` after `steps` steps, each `scale` times as far.
-    #[inline]
     pub fn moved(&self, number: f64, scale: f64, steps: u64, stream: &mut Stream) -> f64 {
         match *self {
             Self::Gaussian { deviation } => {
@@ -55,6 +55,21 @@ impl SmallStep {
                     number = wrap(number + side * most * (ratio * u).exp());
                 }
                 number
+            }
+        }
+    }
+
+    /// Moves the numbers of a row, each as far as its scale says.
+    #[inline]
+    pub fn move_row(&self, row: &mut Row, scales: &Scales, steps: u64, stream: &mut Stream) {
+        if let (Self::Gaussian { deviation }, 1) = (*self, steps) {
+            // The usual case without a branch on the distribution for each number.
+            for (number, scale) in row.iter_mut().zip(scales).filter(|(_, scale)| **scale > 0.0) {
+                *number = wrap(*number + deviation * scale * stream.normal());
+            }
+        } else {
+            for (number, scale) in row.iter_mut().zip(scales).filter(|(_, scale)| **scale > 0.0) {
+                *number = self.moved(*number, *scale, steps, stream);
             }
         }
     }

@@ -83,12 +83,8 @@ impl ChainState {
             if self.large || slot.updated < self.last_large || slot.updated == 0 {
                 slot.row = stream.row();
             } else {
-                let (steps, scales) = (self.step - slot.updated, &self.scales[index]);
-                for (number, scale) in slot.row.iter_mut().zip(scales) {
-                    if *scale > 0.0 {
-                        *number = self.small_step.moved(*number, *scale, steps, stream);
-                    }
-                }
+                let steps = self.step - slot.updated;
+                self.small_step.move_row(&mut slot.row, &self.scales[index], steps, stream);
             }
             slot.updated = self.step;
         }

@@ -21,6 +21,8 @@ pub(super) struct Chain {
     state: ChainState,
     stream: Stream,
     current: Found,
+    /// How often the current path has been counted and not yet been splatted.
+    weight: f64,
     /// The path of `current`, as the technique that it came by has found it.
     path: FullPath,
     /// By kind, proposals and accepted ones. Technique changes of `mmlt` are among its small steps too.
@@ -31,7 +33,7 @@ pub(super) struct Chain {
 
 impl Chain {
     pub(super) fn new(state: ChainState, stream: Stream, current: Found, path: FullPath) -> Self {
-        Self { state, stream, current, path, tallies: Default::default(), failed: 0 }
+        Self { state, stream, current, weight: 0.0, path, tallies: Default::default(), failed: 0 }
     }
 
     fn tally(&mut self, kind: usize, accepted: bool) {
@@ -122,6 +124,7 @@ impl Lane {
                 for _ in 0..mutations {
                     self.mutate(&caster, share.tracer, chain, &mut target, &mut large_steps);
                 }
+                target.splat(&chain.current, std::mem::take(&mut chain.weight));
             }
             large_steps
         };
@@ -130,7 +133,7 @@ impl Lane {
         Job { splats, rays: caster.rays(), large_steps, health: std::mem::take(&mut self.health) }
     }
 
-    /// One mutation; both states are splatted with their expected weight.
+    /// One mutation; both states count with their expected weight.
     fn mutate(
         &mut self,
         scene: &Caster<'_>,
@@ -154,7 +157,7 @@ impl Lane {
                 self.jump(scene, chain);
             }
             if separate && kind < large + self.mutations.jump {
-                target.splat(&chain.current, 1.0);
+                chain.weight += 1.0;
                 return;
             }
         }
@@ -241,22 +244,21 @@ impl Lane {
     #[inline]
     fn decide(&mut self, chain: &mut Chain, kind: usize, proposal: Option<Found>, ratio: f64, target: &mut Target<'_>) {
         let acceptance = if proposal.is_some() { ratio.min(1.0) } else { 0.0 };
-        target.splat(&chain.current, 1.0 - acceptance);
+        chain.weight += 1.0 - acceptance;
         let accepted = chain.stream.number() < acceptance;
         chain.tally(kind, accepted);
-        if let Some(found) = &proposal {
-            target.splat(found, acceptance);
-            if kind == SMALL && found.technique != chain.current.technique {
-                chain.tally(CHANGE, accepted);
-            }
+        let Some(found) = proposal else { return chain.state.reject() };
+        if kind == SMALL && found.technique != chain.current.technique {
+            chain.tally(CHANGE, accepted);
         }
-        match proposal.filter(|_| accepted) {
-            Some(found) => {
-                chain.current = found;
-                chain.state.accept();
-                std::mem::swap(&mut chain.path, &mut self.proposal);
-            }
-            None => chain.state.reject(),
+        if accepted {
+            target.splat(&chain.current, std::mem::replace(&mut chain.weight, acceptance));
+            chain.current = found;
+            chain.state.accept();
+            std::mem::swap(&mut chain.path, &mut self.proposal);
+        } else {
+            target.splat(&found, acceptance);
+            chain.state.reject();
         }
     }
 }
