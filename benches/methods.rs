@@ -15,7 +15,7 @@ fn methods(criterion: &mut Criterion) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     let settings =
         Settings { seed: 1, max_depth: 10, features: true, budget: Budget::Passes(4), ..Settings::default() };
-    for method in [Method::Path, Method::Bdpt, Method::Sppm, Method::Vcm, Method::Mmlt] {
+    for method in [Method::Path, Method::Bdpt, Method::Sppm, Method::Vcm, Method::Pssmlt, Method::Mmlt, Method::Rjmlt] {
         let run = || pool.install(|| render(&scene, method, &settings, |_| {}));
         let counts = run().counts;
         let mut group = criterion.benchmark_group("box 128x128, depth 10, one thread");

@@ -13,7 +13,8 @@ use pathblend::math::Frame;
 use pathblend::scene::{Builder, FilmSpec, Mesh, Scene, Shine};
 use pathblend::spectrum::Spectrum;
 
-const METHODS: [Method; 5] = [Method::Path, Method::Bdpt, Method::Sppm, Method::Vcm, Method::Mmlt];
+const METHODS: [Method; 7] =
+    [Method::Path, Method::Bdpt, Method::Sppm, Method::Vcm, Method::Pssmlt, Method::Mmlt, Method::Rjmlt];
 const SIZE: usize = 16;
 /// Threshold in standard errors. With 15 degrees of freedom a correct program exceeds it about once in 3·10⁵ tests.
 const SIGMAS: f64 = 7.0;
@@ -194,7 +195,7 @@ fn a_point_light_in_a_glass_ball_shines_as_if_it_were_bare() {
         reflectance / std::f64::consts::PI * intensity * height / distance_squared.powf(1.5)
     };
     let expected = (0..n * n).map(radiance).sum::<f64>() / (n * n) as f64;
-    for method in [Method::Light, Method::Bdpt, Method::Sppm, Method::Vcm, Method::Mmlt] {
+    for method in METHODS.into_iter().chain([Method::Light]).filter(|method| *method != Method::Path) {
         expect(&scene, method, 250, "beauty", expected, colour_mean);
         // The first interface lets 96 % pass, and each way back again 96 % of the rest.
         let class = |image: &Image| layer_mean(image, "path_LSDE");
@@ -265,7 +266,7 @@ fn the_unbiased_methods_agree_class_by_class() {
         (0..SEEDS).map(one).collect()
     };
     let path = runs(Method::Path, 256);
-    for (method, passes) in [(Method::Bdpt, 64), (Method::Mmlt, 64)] {
+    for (method, passes) in [(Method::Bdpt, 64), (Method::Pssmlt, 64), (Method::Mmlt, 64), (Method::Rjmlt, 64)] {
         let other = runs(method, passes);
         for (index, word) in classes.into_iter().chain(["all"]).enumerate() {
             let column = |runs: &[Vec<f64>]| moments(&runs.iter().map(|run| run[index]).collect::<Vec<_>>());

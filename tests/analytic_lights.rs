@@ -16,7 +16,8 @@ use pathblend::texture::{Checkerboard, Colour, Picture, Texels, Texture};
 use std::f64::consts::{FRAC_1_PI, PI};
 use std::sync::Arc;
 
-const METHODS: [Method; 5] = [Method::Path, Method::Bdpt, Method::Sppm, Method::Vcm, Method::Mmlt];
+const METHODS: [Method; 7] =
+    [Method::Path, Method::Bdpt, Method::Sppm, Method::Vcm, Method::Pssmlt, Method::Mmlt, Method::Rjmlt];
 const REFLECTANCE: f64 = 0.8;
 const SIZE: usize = 16;
 /// Threshold in standard errors. With 15 degrees of freedom a correct program exceeds it about once in 3·10⁵ tests.

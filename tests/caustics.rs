@@ -19,11 +19,11 @@ const REFLECTANCE: f64 = 0.7;
 /// Of a surface that faces the light.
 const IRRADIANCE: f64 = 3.0;
 /// The methods that find caustics of parallel light.
-const FROM_LIGHT: [Method; 4] = [Method::Bdpt, Method::Sppm, Method::Vcm, Method::Mmlt];
+const FROM_LIGHT: [Method; 6] = [Method::Bdpt, Method::Sppm, Method::Vcm, Method::Pssmlt, Method::Mmlt, Method::Rjmlt];
 
-/// A pass of mmlt begins with thousands of samples of each path length without light.
+/// A pass of chains begins with thousands of samples of each path length without light.
 fn passes(method: Method) -> u64 {
-    if method == Method::Mmlt { 16 } else { 80 }
+    if method.has_chains() { 16 } else { 80 }
 }
 
 /// A square floor in the plane z = 0 whose shading normal is `normal`.

@@ -46,7 +46,7 @@ fn render(folder: &Path, method: &str, out: &str, more: &[&str]) -> Value {
 #[test]
 fn render_prints_the_published_names() {
     let folder = tempfile::tempdir().unwrap();
-    for method in ["path", "bdpt", "sppm", "mmlt"] {
+    for method in ["path", "bdpt", "sppm", "pssmlt", "mmlt", "rjmlt"] {
         let summary = render(folder.path(), method, "a.exr", &["--passes", "2", "--seed", "3"]);
         for name in ["integrator", "seed", "wall_s", "cpu_s", "samples", "rays", "passes", "health"] {
             assert!(summary.get(name).is_some(), "{name} is missing: {summary}");
@@ -60,6 +60,9 @@ fn render_prints_the_published_names() {
     let small = &summary["acceptance"]["small_step"][0];
     assert_eq!(small["length"], 3);
     assert!(small["proposed"].as_u64().unwrap() >= small["accepted"].as_u64().unwrap());
+    let chains = &summary["chains"][0];
+    assert!(chains["mean"].as_f64().unwrap() > chains["standard_error"].as_f64().unwrap());
+    assert!(chains["chains"] == 16 && chains["failed_inversions"] == 0, "{chains}");
 }
 
 #[test]
@@ -229,7 +232,7 @@ fn a_camera_inside_a_wall_sees_nothing() {
         <shape type='sphere'><point name='center' x='5' y='0' z='0'/><emitter type='area'>\
         <rgb name='radiance' value='1'/></emitter></shape></scene>";
     fs::write(path.join("inside.xml"), text).unwrap();
-    for method in ["path", "bdpt", "sppm", "mmlt"] {
+    for method in ["path", "bdpt", "sppm", "pssmlt", "mmlt", "rjmlt"] {
         pathblend()
             .current_dir(path)
             .args(["render", "inside.xml", "-i", method, "--passes", "2", "-o", "x.exr"])

@@ -272,7 +272,7 @@ fn clear_models_are_invisible() {
         for method in METHODS {
             // Only roulette makes noise, and so rarely that it takes many paths to tell. Chains know no roulette, and look
             // for light of dozens of lengths in each pass.
-            let passes = if method == Method::Mmlt { 4 } else { 64 };
+            let passes = if method.has_chains() { 4 } else { 64 };
             let found = estimate(&images(&scene, method, passes), colour_mean);
             worst.expect(method, name, found, Estimate::exact(1.0, 0.0));
         }

@@ -47,7 +47,9 @@ fn methods_agree() {
     for name in ["orthographic", "orthographic_glass", "orthographic_clipped"] {
         let scene = load::read(&folder.join(name).with_extension("xml"), &load::Options::default()).unwrap().scene;
         let expected = tiles(&scene, Method::Path, 96);
-        for (method, passes, bias) in [(Method::Bdpt, 24, 0.003), (Method::Mmlt, 48, 0.003), (Method::Sppm, 48, 0.05)] {
+        for (method, passes, bias) in
+            [(Method::Bdpt, 24, 0.003), (Method::Mmlt, 48, 0.003), (Method::Rjmlt, 48, 0.003), (Method::Sppm, 48, 0.05)]
+        {
             for (i, (a, b)) in expected.iter().zip(tiles(&scene, method, passes)).enumerate() {
                 let excess = ((a.0 - b.0).abs() - bias * a.0).max(0.0) / (a.1 + b.1).sqrt().max(1e-12);
                 assert!(excess < 9.0, "{name} by {}, tile {i}: {:.4}, expected {:.4}", method.name(), b.0, a.0);

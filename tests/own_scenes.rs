@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 
 const SCENES: [&str; 11] =
     ["box", "spheres", "plates", "door", "torus", "ring", "lamp", "gallery", "pool", "bokeh", "porch"];
-const METHODS: [Method; 5] = [Method::Path, Method::Bdpt, Method::Sppm, Method::Vcm, Method::Mmlt];
+const METHODS: [Method; 7] =
+    [Method::Path, Method::Bdpt, Method::Sppm, Method::Vcm, Method::Pssmlt, Method::Mmlt, Method::Rjmlt];
 /// Side of the references, and of the tiles that they are compared in.
 const SIDE: usize = 64;
 const TILE: usize = 16;
@@ -205,7 +206,7 @@ impl Deviations {
 /// All classes that carry a thousandth of the light, all scenes, all methods: prints the table that it checks. Takes some
 /// forty minutes.
 ///
-/// Of `mmlt` those classes are judged of which bdpt knows the light to a percent. The others have one technique only and
+/// Of chains those classes are judged of which bdpt knows the light to a percent. The others have one technique only and
 /// hardly ever find light by it; a chain that comes upon one stays for longer than these runs last, so that most runs
 /// miss it and their spread says nothing of that.
 ///
@@ -220,10 +221,10 @@ fn methods_agree_class_by_class_on_every_scene() {
         let scene = scene(name, [48, 48]);
         let bdpt = classes(&scene, Method::Bdpt, 80, 16);
         let path = classes(&scene, Method::Path, 250, 16);
-        let mmlt = classes(&scene, Method::Mmlt, 150, 16);
+        let chains = [Method::Mmlt, Method::Rjmlt].map(|method| (method, classes(&scene, method, 150, 16)));
         let merging = [Method::Sppm, Method::Vcm];
         let merging = merging.map(|method| (classes(&scene, method, 100, 16), classes(&scene, method, 1000, 8)));
-        let mut deviations: [Deviations; 4] = Default::default();
+        let mut deviations: [Deviations; 5] = Default::default();
         for (word, &(truth, error)) in bdpt.iter().filter(|(_, class)| class.0 >= 1e-3 * bdpt["all"].0) {
             // What only a point light makes, no walk from the camera finds.
             if name != "bokeh" || !(word.contains("LS") || word == "all") {
@@ -231,18 +232,20 @@ fn methods_agree_class_by_class_on_every_scene() {
                 deviations[0].add(word, (mean - truth).abs() / error.hypot(own), mean / truth - 1.0);
             }
             if error < 0.01 * truth {
-                let (mean, own) = class(&mmlt, word);
-                deviations[1].add(word, (mean - truth).abs() / error.hypot(own), mean / truth - 1.0);
+                for (deviations, (_, found)) in deviations[1..].iter_mut().zip(&chains) {
+                    let (mean, own) = class(found, word);
+                    deviations.add(word, (mean - truth).abs() / error.hypot(own), mean / truth - 1.0);
+                }
             }
-            for (deviations, (few, many)) in deviations[2..].iter_mut().zip(&merging) {
+            for (deviations, (few, many)) in deviations[3..].iter_mut().zip(&merging) {
                 let ((few, error_few), (many, error_many)) = (class(few, word), class(many, word));
                 let excess = (many - truth).abs() - 0.8 * (few - truth).abs();
                 deviations.add(word, excess / error.hypot(error_many).hypot(0.8 * error_few), many / truth - 1.0);
             }
         }
-        let [(_, sppm), (_, vcm)] = merging;
+        let ([(_, sppm), (_, vcm)], [(_, mmlt), (_, rjmlt)]) = (merging, chains);
         for ((method, light), deviations) in
-            [("path", path), ("mmlt", mmlt), ("sppm", sppm), ("vcm", vcm)].into_iter().zip(deviations)
+            [("path", path), ("mmlt", mmlt), ("rjmlt", rjmlt), ("sppm", sppm), ("vcm", vcm)].into_iter().zip(deviations)
         {
             deviations.print(name, method, light["all"].0 / bdpt["all"].0);
             all.push((name, method, deviations.worst));

@@ -107,7 +107,7 @@ fn diffuse_plates_exchange_light_as_their_view_factors_say() {
         let scene = facing_plates(looks_down);
         for method in METHODS {
             // Photons and chains take a while: one has a radius that shrinks, the other little light at first.
-            let passes = if matches!(method, Method::Sppm | Method::Mmlt) { 60 } else { 12 };
+            let passes = if method == Method::Sppm || method.has_chains() { 60 } else { 12 };
             let images = images(&scene, method, passes);
             let sum: f64 = expected.iter().map(|(_, value)| value).sum();
             worst.expect(method, "beauty", estimate(&images, colour_mean), Estimate::exact(sum, 2e-5 * sum));

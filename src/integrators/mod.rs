@@ -66,12 +66,17 @@ impl Method {
         }
     }
 
+    /// Whether it walks by Markov chains, from pass to pass.
+    pub fn has_chains(self) -> bool {
+        match self {
+            Self::Path | Self::Light | Self::Bdpt | Self::Sppm | Self::Vcm => false,
+            Self::Pssmlt | Self::Mmlt | Self::Rjmlt => true,
+        }
+    }
+
     /// Whether a render can go on from its film: its passes know nothing of each other but their number.
     pub fn resumes(self) -> bool {
-        match self {
-            Self::Path | Self::Light | Self::Bdpt | Self::Sppm | Self::Vcm => true,
-            Self::Pssmlt | Self::Mmlt | Self::Rjmlt => false,
-        }
+        !self.has_chains()
     }
 }
 

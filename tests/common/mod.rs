@@ -13,7 +13,8 @@ use pathblend::math::Frame;
 use pathblend::scene::{Builder, FilmSpec, Mesh, Scene};
 use pathblend::spectrum::Spectrum;
 
-pub const METHODS: [Method; 5] = [Method::Path, Method::Bdpt, Method::Sppm, Method::Vcm, Method::Mmlt];
+pub const METHODS: [Method; 7] =
+    [Method::Path, Method::Bdpt, Method::Sppm, Method::Vcm, Method::Pssmlt, Method::Mmlt, Method::Rjmlt];
 
 /// Runs of one method on one scene, each with its own seed.
 pub const SEEDS: u64 = 32;
