@@ -37,7 +37,7 @@ pub enum Technique {
 pub const TECHNIQUES: [Technique; 3] = [Technique::Triangle, Technique::Step, Technique::Mixture];
 
 /// Share of the sinusoid in the mixture.
-pub const SINE: f64 = 0.4;
+pub const SINE: f64 = 0.15;
 
 /// The target, of integral 1.
 pub fn target(x: f64) -> f64 {
@@ -117,14 +117,14 @@ pub enum Chain {
 pub const CHAINS: [Chain; 4] = [Chain::Multiplexed, Chain::WithoutJacobian, Chain::FixedPoint, Chain::ReversibleJump];
 
 /// Deviation of small steps, and probability of a jump.
-const STEP: f64 = 0.1;
-const JUMP: f64 = 0.3;
+const STEP: f64 = 0.15;
+const JUMP: f64 = 0.5;
 
 /// Bins of the histogram of x, and of those by technique.
 pub const BINS: usize = 32;
 
 /// Independent chains, and steps of each.
-const RUNS: usize = 2000;
+const RUNS: usize = 16_000;
 const STEPS: usize = 500;
 
 struct State {

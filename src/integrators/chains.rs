@@ -14,9 +14,11 @@ pub(super) const LARGE_STEP: f64 = 0.3;
 /// Independent samples before the chains begin: two per pixel, within these bounds. Large steps refine what they find.
 const FIRST_SAMPLES: RangeInclusive<usize> = 20_000..=200_000;
 
-/// Independent samples before the chains begin, for a film of `size`.
-pub(super) fn first_samples(size: [usize; 2]) -> usize {
-    (2 * size[0] * size[1]).clamp(*FIRST_SAMPLES.start(), *FIRST_SAMPLES.end())
+/// Independent samples in the batch with this number, for a film of `size`. Where the first finds no light, each pass draws
+/// another, which takes as long as mutations would.
+pub(super) fn batch_samples(size: [usize; 2], batch: u64) -> usize {
+    let pixels = size[0] * size[1];
+    if batch == 0 { (2 * pixels).clamp(*FIRST_SAMPLES.start(), *FIRST_SAMPLES.end()) } else { pixels }
 }
 
 /// Independent samples of a target: what tells b_k.

@@ -11,7 +11,7 @@
 //! Light seen directly is rendered by path tracing, and so is direct light unless the settings say otherwise.
 
 use super::bdpt::ROULETTE_FROM;
-use super::chains::{LANES, LARGE_STEP, Mean, first_samples, independent};
+use super::chains::{LANES, LARGE_STEP, Mean, batch_samples, independent};
 use super::{Acceptance, ChainReport, Counts, path::Path, render::Settings};
 use crate::film::{Film, Health, Kernel, PathClass, Splats};
 use crate::markov::{ChainState, Mutations, TECHNIQUES};
@@ -108,7 +108,7 @@ impl Pssmlt {
         let (seed, batches, lengths, state) = (self.seed, self.batches, self.lengths, self.state());
         let stream = |sample: usize| Stream::new(seed, &[2, 0, batches, sample as u64]);
         let memory = || (Lane::default(), state.clone());
-        let targets = independent(scene, first_samples(self.size), memory, |caster, (lane, state), sample| {
+        let targets = independent(scene, batch_samples(self.size, batches), memory, |caster, (lane, state), sample| {
             state.reset();
             lane.find(caster, lengths, state, &mut stream(sample));
             lane.proposal.luminance

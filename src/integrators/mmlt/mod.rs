@@ -12,7 +12,7 @@
 
 mod lane;
 
-use super::chains::{LANES, Mean, first_samples, independent};
+use super::chains::{LANES, Mean, batch_samples, independent};
 use super::{Acceptance, ChainReport, Counts, path::Path, render::Settings};
 use crate::film::{Film, Splats};
 use crate::markov::{ChainState, Mutations, Scales, Tracer};
@@ -54,8 +54,7 @@ pub(super) struct Mmlt {
     seed: u64,
     mutations: Mutations,
     direct: Path,
-    /// Samples per length in a batch.
-    batch: usize,
+    size: [usize; 2],
     lengths: Vec<Length>,
     lanes: Vec<Lane>,
 }
@@ -76,7 +75,7 @@ impl Mmlt {
             seed: settings.seed,
             mutations,
             direct: Path::up_to(settings, direct),
-            batch: first_samples(size).div_ceil(lengths.len().max(1)),
+            size,
             lanes: (0..LANES).map(|_| Lane::new(family, mutations, lengths.len())).collect(),
             lengths,
         }
@@ -85,12 +84,14 @@ impl Mmlt {
     /// Draws a batch of independent samples of a length in which no light has been found; starts its chains where one
     /// finds some.
     fn explore(&mut self, scene: &Scene, index: usize) {
+        let count = self.lengths.len();
         let length = &mut self.lengths[index];
         let (tracer, batches, edges) = (length.tracer, length.batches, length.tracer.edges as u64);
         let key = |sample: usize| [2, edges, batches, sample as u64];
         let state = ChainState::new(self.mutations.small_step, length.scales.clone());
+        let samples = batch_samples(self.size, batches).div_ceil(count);
         let memory = || (Lane::new(Family::Multiplexed, self.mutations, 0), state.clone());
-        let targets = independent(scene, self.batch, memory, |caster, (lane, state), sample| {
+        let targets = independent(scene, samples, memory, |caster, (lane, state), sample| {
             state.reset();
             let found = lane.find(caster, tracer, state, &mut Stream::new(self.seed, &key(sample)));
             found.map_or(0.0, |found| found.luminance)
