@@ -16,6 +16,7 @@ pub mod load;
 pub mod markov;
 pub mod math;
 pub mod paths;
+pub mod report;
 pub mod scene;
 pub mod spectrum;
 pub mod texture;

@@ -69,7 +69,7 @@ pub struct RecipeScene {
 
 impl RecipeScene {
     /// The folder that the scene file is in, which a scene is called by.
-    fn name(&self) -> String {
+    pub fn name(&self) -> String {
         let folder = self.file.parent().and_then(Path::file_name).unwrap_or(self.file.as_os_str());
         folder.to_string_lossy().into_owned()
     }

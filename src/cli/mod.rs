@@ -3,6 +3,7 @@
 mod auto;
 mod blend;
 mod compare;
+mod experiment;
 mod import;
 mod merge;
 mod mutations;
@@ -43,6 +44,9 @@ enum Verb {
     /// Render what a recipe asks for, learn a model from it, and judge it leave-one-scene-out.
     #[command(after_help = "Example: pathblend train training/own.toml -o models/own")]
     Train(train::Train),
+    /// Compare variants of methods over scenes, seeds and times: tables and plots.
+    #[command(after_help = "Example: pathblend experiment training/jumps.toml -o jumps")]
+    Experiment(experiment::Experiment),
     /// Blend two images with a learned model.
     #[command(after_help = "Example: pathblend blend bdpt.exr sppm.exr -o blend.exr")]
     Blend(blend::Blend),
@@ -65,6 +69,7 @@ pub fn run(arguments: Arguments) -> anyhow::Result<()> {
         Verb::Merge(merge) => merge.run(),
         Verb::Compare(compare) => compare.run(),
         Verb::Train(train) => train.run(),
+        Verb::Experiment(experiment) => experiment.run(),
         Verb::Blend(blend) => blend.run(),
         Verb::Auto(auto) => auto.run(),
         Verb::Import(import) => import.run(),

@@ -8,23 +8,23 @@ use clap::{Args, ValueEnum};
 #[command(next_help_heading = "Chains (pssmlt, mmlt, rjmlt)")]
 pub(super) struct MutationArguments {
     /// Probability of a large step. Default: 0.3.
-    #[arg(long, value_name = "P")]
+    #[arg(long, value_name = "P", allow_negative_numbers = true)]
     large_step: Option<f64>,
     /// How jumps between techniques come about: rjmlt.
     #[arg(long, value_enum, default_value_t = Jumps::Separate)]
     jumps: Jumps,
     /// Probability of a jump, where jumps are separate: rjmlt.
-    #[arg(long, value_name = "P", default_value_t = 0.05)]
+    #[arg(long, value_name = "P", default_value_t = 0.05, allow_negative_numbers = true)]
     jump: f64,
     /// By what distribution numbers move.
     #[arg(long, value_enum, default_value_t = Distribution::Gaussian)]
     small_step: Distribution,
     /// How far they move: the standard deviation, or Kelemen's upper bound. Default: 0.01, or 1/64.
-    #[arg(long, value_name = "SIZE")]
+    #[arg(long, value_name = "SIZE", allow_negative_numbers = true)]
     step_size: Option<f64>,
     /// How far the film position moves: `aspect` (as far in both directions), `shares` (by the same share of width and
     /// height), or a number of pixels.
-    #[arg(long, value_name = "STEPS", default_value = "aspect", value_parser = parse_film_steps)]
+    #[arg(long, value_name = "STEPS", default_value = "aspect", allow_negative_numbers = true, value_parser = parse_film_steps)]
     film_steps: FilmSteps,
     /// Small steps leave discrete choices, of lobes and lights, as they are.
     #[arg(long)]

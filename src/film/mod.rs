@@ -149,15 +149,15 @@ impl Film {
         let occurs = |class| self.sums.bands.iter().any(|band| band.has(class));
         // An image without any light still says that it has class layers.
         let dark = self.features && !PathClass::all().any(occurs);
-        for class in PathClass::all() {
-            if !(occurs(class) || dark && class == Word::EMPTY.class()) {
-                continue;
-            }
+        let shown = |class: &PathClass| occurs(*class) || dark && *class == Word::EMPTY.class();
+        let classes: Vec<PathClass> = PathClass::all().filter(shown).collect();
+        let layer = |class: &PathClass| {
             let layer = Array2::from_shape_fn((height, width), |(y, x)| {
-                (self.sums.bands[y / BAND_ROWS].luminance(class, [x, y]) / self.divisor()) as f32
+                (self.sums.bands[y / BAND_ROWS].luminance(*class, [x, y]) / self.divisor()) as f32
             });
-            image.layers.insert(class.layer_name(), Layer::Luminance(layer));
-        }
+            (class.layer_name(), Layer::Luminance(layer))
+        };
+        image.layers.extend(classes.par_iter().map(layer).collect::<Vec<_>>());
         if let Some(variance) = self.variance() {
             image.layers.insert(VARIANCE_LAYER.to_owned(), Layer::Colour(variance));
         }

@@ -170,9 +170,10 @@ impl Film {
     pub fn noise(&self) -> Option<NoiseEstimate> {
         let (colour, variance, halves) =
             (self.colour(), self.by_batches(Moments::variance)?, self.by_batches(Moments::halves)?);
-        let Expected { relative, relative_trimmed } = Expected::of(colour.view(), variance.view())?;
-        let halves = Expected::of(colour.view(), halves.view())?.relative;
-        Some(NoiseEstimate { relative, relative_trimmed, halves })
+        let expected = |variance: &Array3<f32>| Expected::of(colour.view(), variance.view());
+        let (batches, halves) = rayon::join(|| expected(&variance), || expected(&halves));
+        let Expected { relative, relative_trimmed } = batches?;
+        Some(NoiseEstimate { relative, relative_trimmed, halves: halves?.relative })
     }
 
     fn by_batches(&self, value: fn(&Moments, &Batches) -> [f64; 3]) -> Option<Array3<f32>> {

@@ -105,7 +105,7 @@ pub struct Counts {
 }
 
 /// Chains of one target.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChainReport {
     /// Length of their paths in edges; 0 where they have paths of all lengths.
     pub length: usize,

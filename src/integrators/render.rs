@@ -245,7 +245,8 @@ impl<'a> Run<'a> {
     }
 
     pub fn finish(self) -> Outcome {
-        let (image, noise, Elapsed { wall, cpu }) = (self.film.develop(), self.film.noise(), self.elapsed());
+        let (image, noise) = rayon::join(|| self.film.develop(), || self.film.noise());
+        let Elapsed { wall, cpu } = self.elapsed();
         let (passes, health) = (self.film.passes(), self.film.health());
         let mut outcome = Outcome { image, passes, noise, wall, cpu, counts: self.counts, health };
         outcome.image.manifest = manifest(self.scene, self.method, self.settings, &outcome);

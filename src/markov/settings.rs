@@ -16,7 +16,7 @@ pub enum Jumps {
 }
 
 /// How far the film position moves in small steps (Bitterli 2015, section 4.1).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum FilmSteps {
     /// By the same share of the film's width and height, like other numbers.
@@ -28,8 +28,8 @@ pub enum FilmSteps {
 }
 
 /// How large steps choose the technique.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum LargeSteps {
     /// Evenly.
     Plain,
@@ -38,7 +38,8 @@ pub enum LargeSteps {
 }
 
 /// How chains move.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Mutations {
     /// Probability of a large step; `None` for the usual one of the method.
     pub large_step: Option<f64>,

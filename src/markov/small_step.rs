@@ -2,11 +2,11 @@
 
 use super::settings::Scales;
 use crate::math::{Row, Stream};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// How far a number moves.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SmallStep {
     /// By a normal distribution of this standard deviation.
