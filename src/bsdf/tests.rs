@@ -129,6 +129,44 @@ fn rows_invert() {
     });
 }
 
+/// Where one lobe alone leads to a direction, its density is the share of the first number that chooses the lobe over the
+/// map's Jacobian, by central differences.
+#[test]
+fn densities_are_jacobians() {
+    let mut models = std::collections::BTreeSet::new();
+    const CHOICES: usize = 256;
+    for_samples(6, 400, |case, wi, row, scatter, walk, _| {
+        if scatter.delta || case.mixes {
+            return;
+        }
+        let at = |row: Row| case.bsdf.sample(&here(), wi, row, walk).map(|found| (found.direction, found.delta));
+        let first = |i: usize| (i as f64 + 0.5) / CHOICES as f64;
+        let same = |i: &usize| at([first(*i), row[1], row[2], row[3]]) == Some((scatter.direction, false));
+        let share = (0..CHOICES).filter(same).count() as f64 / CHOICES as f64;
+        let h = 1e-5;
+        let difference = |i: usize| {
+            let moved = |by: f64| {
+                let mut moved = row;
+                moved[i] += by;
+                at(moved).map(|(direction, _)| direction)
+            };
+            let (near, far) = ((moved(h)? - moved(-h)?) / (2.0 * h), (moved(2.0 * h)? - moved(-2.0 * h)?) / (4.0 * h));
+            // The maps of the disk have kinks, where differences mean nothing.
+            ((near - far).length() < 1e-4 * near.length()).then_some(near)
+        };
+        let (Some(du), Some(dv)) = (difference(1), difference(2)) else { return };
+        let (pdf, unsure) = (share / du.cross(dv).length(), 1.0 / (CHOICES as f64 * share));
+        models.insert(case.name.clone());
+        assert!(
+            (pdf / scatter.pdf.0 - 1.0).abs() < 2e-3 + unsure,
+            "{}: {wi} {row:?}: {pdf} {:?}",
+            case.name,
+            scatter.pdf
+        );
+    });
+    assert!(models.len() >= 8, "{models:?}");
+}
+
 /// Rows that are drawn by inversion are distributed as those that sampled the directions.
 #[test]
 fn inverted_rows_keep_their_distribution() {
