@@ -61,7 +61,8 @@ impl Experiment {
             }
         });
         let titles = [&format!("{scene}: mean squared error"), "log10 of seconds", "log10 of the error"];
-        chart(&folder.join(format!("{scene}-error.svg")), titles, &series.collect::<Vec<_>>())
+        let corner = SeriesLabelPosition::UpperRight;
+        chart(&folder.join(format!("{scene}-error.svg")), titles, corner, &series.collect::<Vec<_>>())
     }
 
     /// Accepted share by length, of all kinds of mutations.
@@ -88,12 +89,12 @@ impl Experiment {
         let corners = vec![(span, [0.0, 0.0]), (span, [1.0, 1.0])];
         series.push(Series { name: String::new(), colour: WHITE, points: Vec::new(), band: corners });
         let titles = [&format!("{scene}: accepted"), "path length", "share"];
-        chart(&folder.join(format!("{scene}-acceptance.svg")), titles, &series)
+        chart(&folder.join(format!("{scene}-acceptance.svg")), titles, SeriesLabelPosition::LowerLeft, &series)
     }
 }
 
-/// Draws lines with their names. Titles are those of the chart and of both axes.
-fn chart(path: &Path, titles: [&str; 3], series: &[Series]) -> Result<(), ReportError> {
+/// Draws lines with their names at the place `legend`. Titles are those of the chart and of both axes.
+fn chart(path: &Path, titles: [&str; 3], legend: SeriesLabelPosition, series: &[Series]) -> Result<(), ReportError> {
     let fail = |error: &dyn std::fmt::Display| ReportError::Plot {
         name: path.display().to_string(),
         message: error.to_string(),
@@ -135,7 +136,12 @@ fn chart(path: &Path, titles: [&str; 3], series: &[Series]) -> Result<(), Report
             drawn.label(name).legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], colour.stroke_width(2)));
         }
         let mut labels = chart.configure_series_labels();
-        labels.background_style(WHITE.mix(0.8)).border_style(BLACK.mix(0.3)).draw().map_err(|error| fail(&error))?;
+        labels
+            .position(legend)
+            .background_style(WHITE.mix(0.8))
+            .border_style(BLACK.mix(0.3))
+            .draw()
+            .map_err(|error| fail(&error))?;
         root.present().map_err(|error| fail(&error))?;
     }
     crate::image::write_whole(path, |out| {

@@ -196,7 +196,7 @@ impl Lane {
     fn small_step(&mut self, scene: &Caster<'_>, tracer: Tracer, chain: &mut Chain, target: &mut Target<'_>) {
         chain.state.propose(false);
         let Chain { state, stream, current, path, .. } = chain;
-        let mut correction = 1.0;
+        let (before, mut technique, mut correction) = (current.technique, current.technique, 1.0);
         let proposal = if self.mutations.controlled {
             let Self { proposal, health, controlled, .. } = self;
             let found = controlled_step(tracer, scene, (path, current), state, stream, proposal, health, controlled);
@@ -206,15 +206,19 @@ impl Lane {
             })
         } else {
             match self.family {
-                Family::Multiplexed => self.find(scene, tracer, state, stream),
-                Family::Jumping => {
-                    tracer.find(scene, current.technique, state, stream, &mut self.proposal, &mut self.health)
+                Family::Multiplexed => {
+                    technique = tracer.technique(state.row(Tracer::TECHNIQUE_ROW, stream)[0]);
+                    self.find(scene, tracer, state, stream)
                 }
+                Family::Jumping => tracer.find(scene, before, state, stream, &mut self.proposal, &mut self.health),
             }
         };
         let luminance = proposal.map_or(0.0, |found| found.luminance);
         let ratio = correction * luminance / chain.current.luminance;
-        self.decide(chain, SMALL, proposal, ratio, target);
+        let accepted = self.decide(chain, SMALL, proposal, ratio, target);
+        if technique != before {
+            chain.tally(CHANGE, accepted);
+        }
     }
 
     /// A large step among all techniques.
@@ -240,17 +244,24 @@ impl Lane {
         self.decide(chain, LARGE, proposal, sum / before, target);
     }
 
-    /// Accepts or rejects the proposal, whose acceptance is `ratio`.
+    /// Accepts or rejects the proposal, whose acceptance is `ratio`; says which.
     #[inline]
-    fn decide(&mut self, chain: &mut Chain, kind: usize, proposal: Option<Found>, ratio: f64, target: &mut Target<'_>) {
+    fn decide(
+        &mut self,
+        chain: &mut Chain,
+        kind: usize,
+        proposal: Option<Found>,
+        ratio: f64,
+        target: &mut Target<'_>,
+    ) -> bool {
         let acceptance = if proposal.is_some() { ratio.min(1.0) } else { 0.0 };
         chain.weight += 1.0 - acceptance;
         let accepted = chain.stream.number() < acceptance;
         chain.tally(kind, accepted);
-        let Some(found) = proposal else { return chain.state.reject() };
-        if kind == SMALL && found.technique != chain.current.technique {
-            chain.tally(CHANGE, accepted);
-        }
+        let Some(found) = proposal else {
+            chain.state.reject();
+            return false;
+        };
         if accepted {
             target.splat(&chain.current, std::mem::replace(&mut chain.weight, acceptance));
             chain.current = found;
@@ -260,5 +271,6 @@ impl Lane {
             target.splat(&found, acceptance);
             chain.state.reject();
         }
+        accepted
     }
 }
