@@ -77,10 +77,11 @@ fn bad_recipes_are_refused() {
 #[test]
 fn bad_options_of_chains_are_refused_before_any_work() {
     let folder = tempfile::tempdir().unwrap();
-    let cases: [(&[&str], &[&str]); 8] = [
+    let cases: [(&[&str], &[&str]); 9] = [
         (&["--large-step", "0"], &["large step is 0", "above 0"]),
         (&["--large-step", "1.5"], &["large step is 1.5"]),
-        (&["--jump", "-0.1"], &["jump"]),
+        (&["--jump", "-0.1"], &["technique jump is -0.1"]),
+        (&["--jump", "0.8"], &["0.3", "0.8", "more than 1"]),
         (&["--large-step", "0.8", "--jump", "0.3"], &["0.8", "0.3", "more than 1"]),
         (&["--step-size", "0"], &["small steps is 0"]),
         (&["--small-step", "kelemen", "--step-size", "0.9"], &["small steps is 0.9"]),

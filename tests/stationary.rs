@@ -49,9 +49,9 @@ fn quarters(images: &[Image], class: &str) -> Vec<Estimate> {
 
 /// Every mutation alone, and with jumps.
 fn cases() -> Vec<(&'static str, Method, Mutations)> {
-    let never = Mutations { large_step: Some(0.0), jump: 0.0, ..Mutations::default() };
+    let never = Mutations { large_step: 0.0, jump: 0.0, ..Mutations::default() };
     let jumping = Mutations { jump: 0.3, ..never };
-    let tries = Mutations { large_step: Some(1.0), large_steps: LargeSteps::TriesFrom(0), ..never };
+    let tries = Mutations { large_step: 1.0, large_steps: LargeSteps::TriesFrom(0), ..never };
     let kelemen = Mutations { small_step: SmallStep::KELEMEN, ..never };
     vec![
         ("small steps", Method::Mmlt, never),
@@ -66,9 +66,9 @@ fn cases() -> Vec<(&'static str, Method, Mutations)> {
         ("jumps before small steps", Method::Rjmlt, Mutations { jumps: Jumps::Always, ..never }),
         ("jumps alone", Method::Rjmlt, Mutations { jump: 1.0, ..never }),
         ("kept choices and jumps", Method::Rjmlt, Mutations { keep_choices: true, ..jumping }),
-        ("large steps", Method::Rjmlt, Mutations { large_step: Some(1.0), ..never }),
+        ("large steps", Method::Rjmlt, Mutations { large_step: 1.0, ..never }),
         ("tries", Method::Mmlt, tries),
-        ("tries and jumps", Method::Rjmlt, Mutations { large_step: Some(0.5), jump: 0.5, ..tries }),
+        ("tries and jumps", Method::Rjmlt, Mutations { large_step: 0.5, jump: 0.5, ..tries }),
         ("small steps of all lengths", Method::Pssmlt, never),
         ("Kelemen's steps of all lengths", Method::Pssmlt, kelemen),
         ("kept choices of all lengths", Method::Pssmlt, Mutations { keep_choices: true, ..never }),

@@ -7,9 +7,9 @@ use clap::{Args, ValueEnum};
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Chains (pssmlt, mmlt, rjmlt)")]
 pub(super) struct MutationArguments {
-    /// Probability of a large step. Default: 0.3.
-    #[arg(long, value_name = "P", allow_negative_numbers = true)]
-    large_step: Option<f64>,
+    /// Probability of a large step.
+    #[arg(long, value_name = "P", default_value_t = 0.3, allow_negative_numbers = true)]
+    large_step: f64,
     /// How jumps between techniques come about: rjmlt.
     #[arg(long, value_enum, default_value_t = Jumps::Separate)]
     jumps: Jumps,

@@ -8,9 +8,6 @@ use std::ops::RangeInclusive;
 /// number of threads.
 pub(super) const LANES: usize = 16;
 
-/// Probability of a large step where none is given.
-pub(super) const LARGE_STEP: f64 = 0.3;
-
 /// Independent samples before the chains begin: two per pixel, within these bounds. Large steps refine what they find.
 const FIRST_SAMPLES: RangeInclusive<usize> = 20_000..=200_000;
 

@@ -11,7 +11,7 @@
 //! Light seen directly is rendered by path tracing, and so is direct light unless the settings say otherwise.
 
 use super::bdpt::ROULETTE_FROM;
-use super::chains::{LANES, LARGE_STEP, Mean, batch_samples, independent};
+use super::chains::{LANES, Mean, batch_samples, independent};
 use super::{Acceptance, ChainReport, Counts, path::Path, render::Settings};
 use crate::film::{Film, Health, Kernel, PathClass, Splats};
 use crate::markov::{ChainState, Mutations, TECHNIQUES};
@@ -139,7 +139,7 @@ impl Pssmlt {
         let pixels = (self.size[0] * self.size[1]) as u64;
         let mutations = if self.mean.sum > 0.0 { pixels } else { 0 };
         let (kernel, size, worth) = (film.kernel.clone(), film.size, self.mean.mean());
-        let (lengths, large) = (self.lengths, self.mutations.large_step.unwrap_or(LARGE_STEP));
+        let (lengths, large) = (self.lengths, self.mutations.large_step);
         let run = |(number, lane): (usize, &mut Lane)| {
             let turn = (number as u64 + pass) % LANES as u64;
             let share = mutations / LANES as u64 + u64::from(turn < mutations % LANES as u64);

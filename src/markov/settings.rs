@@ -41,8 +41,8 @@ pub enum LargeSteps {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Mutations {
-    /// Probability of a large step; `None` for the usual one of the method.
-    pub large_step: Option<f64>,
+    /// Probability of a large step.
+    pub large_step: f64,
     /// Probability of a technique jump, where jumps are separate; small steps have what is left.
     pub jump: f64,
     /// How technique jumps come about, in rjmlt.
@@ -64,7 +64,7 @@ pub struct Mutations {
 impl Default for Mutations {
     fn default() -> Self {
         Self {
-            large_step: None,
+            large_step: 0.3,
             jump: 0.05,
             jumps: Jumps::Separate,
             small_step: SmallStep::Gaussian { deviation: 0.01 },
@@ -94,14 +94,14 @@ pub enum MutationsError {
 impl Mutations {
     /// The mutations, if chains can move so and reach everything.
     pub fn checked(self) -> Result<Self, MutationsError> {
-        let large = self.large_step.unwrap_or(0.5);
+        let large = self.large_step;
         if !(large > 0.0 && large <= 1.0) {
             return Err(MutationsError::Probability("a large step", large, "a number above 0, at most 1"));
         }
         if !(0.0..=1.0).contains(&self.jump) {
             return Err(MutationsError::Probability("a technique jump", self.jump, "a number from 0 to 1"));
         }
-        if self.large_step.is_some_and(|large| large + self.jump > 1.0) {
+        if large + self.jump > 1.0 {
             return Err(MutationsError::Sum(large, self.jump));
         }
         let size = match self.small_step {
@@ -188,11 +188,11 @@ mod tests {
         let usual = Mutations::default();
         assert!(usual.checked().is_ok());
         let bad = [
-            Mutations { large_step: Some(0.0), ..usual },
-            Mutations { large_step: Some(1.1), ..usual },
-            Mutations { large_step: Some(f64::NAN), ..usual },
+            Mutations { large_step: 0.0, ..usual },
+            Mutations { large_step: 1.1, ..usual },
+            Mutations { large_step: f64::NAN, ..usual },
             Mutations { jump: -0.1, ..usual },
-            Mutations { large_step: Some(0.9), jump: 0.2, ..usual },
+            Mutations { large_step: 0.9, jump: 0.2, ..usual },
             Mutations { small_step: SmallStep::Gaussian { deviation: 0.0 }, ..usual },
             Mutations { small_step: SmallStep::Kelemen { least: 0.1, most: 0.7 }, ..usual },
         ];

@@ -1,6 +1,6 @@
 //! The chains of one lane, and what they do in a pass.
 
-use super::super::chains::{LANES, LARGE_STEP, Mean};
+use super::super::chains::{LANES, Mean};
 use super::{Family, Share};
 use crate::film::{Health, Kernel, Splats};
 use crate::markov::{
@@ -143,7 +143,7 @@ impl Lane {
         large_steps: &mut Mean,
     ) {
         let kind = chain.stream.number();
-        let large = self.mutations.large_step.unwrap_or(LARGE_STEP);
+        let large = self.mutations.large_step;
         if kind < large {
             match self.mutations.tries(tracer.edges) {
                 true => self.try_all(scene, tracer, chain, target, large_steps),

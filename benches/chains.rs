@@ -1,0 +1,56 @@
+//! Mutations per CPU second of one thread, and rays per mutation: `cargo bench --bench chains`.
+//!
+//! Each kind of mutation alone, on the box of this repository at 256×256 with paths of up to ten edges. All light but that
+//! seen directly is found by chains; the path tracing of the latter is in the time, its rays are not among those of the
+//! mutations.
+
+use pathblend::integrators::{Budget, Method, Settings, render};
+use pathblend::load;
+use pathblend::markov::{LargeSteps, Mutations};
+use pathblend::scene::Scene;
+use std::path::Path;
+use std::time::Duration;
+
+fn measure(scene: &Scene, name: &str, method: Method, mutations: Mutations) {
+    let settings = Settings {
+        max_depth: 10,
+        features: false,
+        budget: Budget::Cpu(Duration::from_secs(3)),
+        mutations: Mutations { separate_direct: false, ..mutations },
+        ..Settings::default()
+    };
+    let outcome = render(scene, method, &settings, |_| {});
+    // As many paths as mutations see light directly.
+    let (mutations, pixels) = (outcome.counts.samples as f64 / 2.0, scene.camera.size.iter().product::<usize>() as f64);
+    let rays = outcome.counts.rays as f64 - outcome.passes as f64 * pixels;
+    println!(
+        "| {name} | {} | {:.3} M | {:.2} |",
+        method.name(),
+        mutations / outcome.cpu.as_secs_f64() / 1e6,
+        rays / mutations
+    );
+}
+
+fn main() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/box/scene.xml");
+    let options = load::Options { size: Some([256, 256]), ..load::Options::default() };
+    let Ok(loaded) = load::read(&file, &options) else { return eprintln!("the box does not load") };
+    let Ok(pool) = rayon::ThreadPoolBuilder::new().num_threads(1).build() else { return eprintln!("no thread") };
+    let usual = Mutations::default();
+    let never = Mutations { large_step: 0.0, jump: 0.0, ..usual };
+    let large = Mutations { large_step: 1.0, ..never };
+    let cases = [
+        ("usual", Method::Rjmlt, usual),
+        ("usual", Method::Mmlt, usual),
+        ("usual", Method::Pssmlt, usual),
+        ("small steps", Method::Rjmlt, never),
+        ("large steps", Method::Rjmlt, large),
+        ("jumps", Method::Rjmlt, Mutations { jump: 1.0, ..never }),
+        ("controlled steps", Method::Rjmlt, Mutations { controlled: true, ..never }),
+        ("tries", Method::Rjmlt, Mutations { large_steps: LargeSteps::TriesFrom(0), ..large }),
+    ];
+    println!("| mutations | method | per CPU second | rays for each |\n|---|---|---|---|");
+    for (name, method, mutations) in cases {
+        pool.install(|| measure(&loaded.scene, name, method, mutations));
+    }
+}
