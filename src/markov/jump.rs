@@ -10,8 +10,9 @@
 //! ```
 //!
 //! No ray is cast: the new target follows from the old one by the ratio of the densities. Rows of vertices that change
-//! hands are inverted; rows that are no longer read may have any value, so that they are drawn anew. To keep them as they
-//! are would tie them to the path: the mistake of a fixed point in an ambiguous interval.
+//! hands are inverted; what the path does not tell of them, lobes and unused numbers, is drawn. To take a fixed point of
+//! its interval instead would be a mistake. Rows that are no longer read are forgotten: a jump back sets them before they
+//! are read again, but large steps that try all techniques read them, and must find them free of the path.
 
 use super::found::{Found, TECHNIQUES, Tracer};
 use super::state::ChainState;
