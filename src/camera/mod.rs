@@ -77,8 +77,14 @@ impl Camera {
         }
     }
 
-    /// The row that [`Camera::ray`] reads for the point `lens` of the lens, with the film position `film` before it as shares
-    /// of the film's width and height; numbers that it leaves open are taken from `gamma`.
+    /// The film position that the first two numbers of a row stand for, evenly over the film.
+    #[inline]
+    pub fn film_position(&self, row: Row) -> DVec2 {
+        DVec2::new(row[0] * self.size[0] as f64, row[1] * self.size[1] as f64)
+    }
+
+    /// The row that [`Camera::ray`] reads for the point `lens` of the lens, and that [`Camera::film_position`]
+    /// takes to `film`; numbers that it leaves open are taken from `gamma`.
     pub fn invert(&self, film: DVec2, lens: DVec3, gamma: Row) -> Row {
         let [x, y] = [film.x / self.size[0] as f64, film.y / self.size[1] as f64];
         match self.projection {

@@ -8,6 +8,13 @@ use std::ops::RangeInclusive;
 /// number of threads.
 pub(super) const LANES: usize = 16;
 
+/// What lane number `lane` makes in a pass of `mutations` by all lanes. What does not divide evenly goes round the lanes
+/// from pass to pass.
+pub(super) fn share(mutations: u64, lane: usize, pass: u64) -> u64 {
+    let lanes = LANES as u64;
+    mutations / lanes + u64::from((lane as u64 + pass) % lanes < mutations % lanes)
+}
+
 /// Independent samples before the chains begin: two per pixel, within these bounds. Large steps refine what they find.
 const FIRST_SAMPLES: RangeInclusive<usize> = 20_000..=200_000;
 

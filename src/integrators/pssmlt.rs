@@ -11,7 +11,7 @@
 //! Light seen directly is rendered by path tracing, and so is direct light unless the settings say otherwise.
 
 use super::bdpt::ROULETTE_FROM;
-use super::chains::{LANES, Mean, batch_samples, independent};
+use super::chains::{LANES, Mean, batch_samples, independent, share};
 use super::{Acceptance, ChainReport, Counts, path::Path, render::Settings};
 use crate::film::{Film, Health, Kernel, PathClass, Splats};
 use crate::markov::{ChainState, Mutations, TECHNIQUES};
@@ -83,7 +83,7 @@ impl Lengths {
 
 impl Pssmlt {
     pub(super) fn start(scene: &Scene, settings: &Settings) -> Self {
-        let direct = if settings.mutations.separate_direct { 2 } else { 1 };
+        let direct = settings.mutations.traced_edges();
         Self {
             seed: settings.seed,
             mutations: settings.mutations,
@@ -141,9 +141,8 @@ impl Pssmlt {
         let (kernel, size, worth) = (film.kernel.clone(), film.size, self.mean.mean());
         let (lengths, large) = (self.lengths, self.mutations.large_step);
         let run = |(number, lane): (usize, &mut Lane)| {
-            let turn = (number as u64 + pass) % LANES as u64;
-            let share = mutations / LANES as u64 + u64::from(turn < mutations % LANES as u64);
-            lane.run(&Caster::new(scene), lengths, share, large, worth, &kernel, size)
+            let mutations = share(mutations, number, pass);
+            lane.run(&Caster::new(scene), lengths, mutations, large, worth, &kernel, size)
         };
         let jobs: Vec<Job> = self.lanes.par_iter_mut().enumerate().map(run).collect();
         for job in &jobs {
@@ -174,7 +173,7 @@ impl Lane {
         let Self { walks, proposal, health, .. } = self;
         proposal.paths.clear();
         let first = state.row(0, stream);
-        let film = DVec2::new(first[0] * scene.camera.size[0] as f64, first[1] * scene.camera.size[1] as f64);
+        let film = scene.camera.film_position(first);
         let (camera, light) = (&mut walks.camera, &mut walks.light);
         trace_camera(scene, film, first, &mut state.rows(0, true, stream), lengths.most + 1, ROULETTE_FROM, camera);
         let rows = &mut state.rows(lengths.light_rows(), true, stream);

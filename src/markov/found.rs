@@ -91,7 +91,7 @@ impl Tracer {
         t: usize,
         path: &mut FullPath,
     ) -> Option<()> {
-        path.film = DVec2::new(first[0] * scene.camera.size[0] as f64, first[1] * scene.camera.size[1] as f64);
+        path.film = scene.camera.film_position(first);
         trace_camera(scene, path.film, first, rows, t, NEVER, &mut path.camera);
         (path.camera.vertices.len() == t).then_some(())
     }

@@ -16,7 +16,7 @@
 
 use super::found::{Found, TECHNIQUES, Tracer};
 use super::state::ChainState;
-use crate::math::{Row, Stream};
+use crate::math::{Row, Stream, pick};
 use crate::paths::{FullPath, Heuristic};
 use crate::scene::Scene;
 
@@ -43,15 +43,9 @@ pub fn jump(
     let heuristic = TECHNIQUES.heuristic.unwrap_or(Heuristic::Power);
     let JumpMemory { densities, rows } = memory;
     path.densities(densities);
-    let total: f64 = densities.iter().map(|density| heuristic.apply(*density)).sum();
-    let mut rest = stream.number() * total;
-    let chosen = densities.iter().position(|density| {
-        rest -= heuristic.apply(*density);
-        rest < 0.0
-    });
     let from = found.technique;
-    // By rounding the last weight may not be reached.
-    let to = chosen.unwrap_or(from);
+    let weights = densities.iter().map(|density| heuristic.apply(*density));
+    let to = pick(weights, stream.number()).unwrap_or(from);
     if to == from {
         return Jump::Stayed;
     }
@@ -76,7 +70,7 @@ pub struct JumpMemory {
 }
 
 /// The rows that technique `to` reads and `from` does not.
-pub(super) fn invert(
+fn invert(
     scene: &Scene,
     path: &FullPath,
     from: usize,

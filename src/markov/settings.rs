@@ -104,14 +104,16 @@ impl Mutations {
         if large + self.jump > 1.0 {
             return Err(MutationsError::Sum(large, self.jump));
         }
-        let size = match self.small_step {
-            SmallStep::Gaussian { deviation } => deviation,
-            SmallStep::Kelemen { most, .. } => most,
-        };
+        let size = self.small_step.size();
         if !(size > 0.0 && size <= 0.5) {
             return Err(MutationsError::Step(size));
         }
         Ok(self)
+    }
+
+    /// Edges of the longest paths that are left to path tracing.
+    pub fn traced_edges(&self) -> usize {
+        if self.separate_direct { 2 } else { 1 }
     }
 
     /// Whether large steps of paths with `edges` edges try all techniques.
@@ -128,14 +130,10 @@ impl Mutations {
     /// whether the walk goes on.
     pub fn scales(&self, walk: Walk, index: usize, size: [usize; 2], plays_roulette: bool) -> Scales {
         let [width, height] = size.map(|pixels| pixels as f64);
-        let deviation = match self.small_step {
-            SmallStep::Gaussian { deviation } => deviation,
-            SmallStep::Kelemen { most, .. } => most,
-        };
         let [x, y] = match self.film_steps {
             FilmSteps::Shares => [1.0, 1.0],
             FilmSteps::Aspect => [(height / width).sqrt(), (width / height).sqrt()],
-            FilmSteps::Pixels(pixels) => [width, height].map(|side| pixels / (side * deviation)),
+            FilmSteps::Pixels(pixels) => [width, height].map(|side| pixels / (side * self.small_step.size())),
         };
         let scale = |used: Use| match used {
             Use::FilmX => x,

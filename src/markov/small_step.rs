@@ -38,6 +38,14 @@ impl SmallStep {
     /// Kelemen's distribution with his bounds.
     pub const KELEMEN: Self = Self::Kelemen { least: 1.0 / 1024.0, most: 1.0 / 64.0 };
 
+    /// The deviation, or the upper bound.
+    pub fn size(&self) -> f64 {
+        match *self {
+            Self::Gaussian { deviation } => deviation,
+            Self::Kelemen { most, .. } => most,
+        }
+    }
+
     /// `number` after `steps` steps, each `scale` times as far.
     pub fn moved(&self, number: f64, scale: f64, steps: u64, stream: &mut Stream) -> f64 {
         match *self {

@@ -108,11 +108,6 @@ impl ChainState {
         self.slots[index].updated = 0;
     }
 
-    /// How far the numbers of row `index` move.
-    pub fn scales(&self, index: usize) -> Scales {
-        self.scales[index]
-    }
-
     /// How far numbers move.
     pub fn small_step(&self) -> SmallStep {
         self.small_step

@@ -11,7 +11,7 @@
 use super::found::{Found, TECHNIQUES, Tracer};
 use super::state::ChainState;
 use crate::film::Health;
-use crate::math::Stream;
+use crate::math::{Stream, pick};
 use crate::paths::{FullPath, Junction, connect};
 use crate::scene::Caster;
 
@@ -60,13 +60,8 @@ impl Tries {
 
     /// Draws one of the connections in proportion to their targets; its path is left in `path`.
     pub fn choose(&mut self, tracer: Tracer, stream: &mut Stream, path: &mut FullPath) -> Option<Found> {
-        let total: f64 = self.found.iter().map(|(found, _)| found.luminance).sum();
-        let mut rest = stream.number() * total;
-        let chosen = self.found.iter().find(|(found, _)| {
-            rest -= found.luminance;
-            rest < 0.0
-        });
-        let (found, junction) = *chosen.or(self.found.last())?;
+        let chosen = pick(self.found.iter().map(|(found, _)| found.luminance), stream.number());
+        let (found, junction) = *chosen.map_or(self.found.last(), |index| self.found.get(index))?;
         std::mem::swap(path, &mut self.walks);
         path.light.vertices.truncate(found.technique);
         path.camera.vertices.truncate(tracer.techniques() - found.technique);

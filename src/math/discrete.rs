@@ -62,6 +62,18 @@ impl Discrete {
     }
 }
 
+/// The place of one of `weights`, drawn by `u` in [0, 1) in proportion to them; `None` where rounding leads beyond the last.
+/// For weights that are used once, so that nothing is kept of them.
+#[inline]
+pub fn pick(weights: impl Iterator<Item = f64> + Clone, u: f64) -> Option<usize> {
+    let mut rest = u * weights.clone().sum::<f64>();
+    let mut weights = weights;
+    weights.position(|weight| {
+        rest -= weight;
+        rest < 0.0
+    })
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::expect_used)]
@@ -80,6 +92,17 @@ mod tests {
             assert!((distribution.invert(index, rest) - u).abs() < 1e-12);
         }
         assert_eq!(counts, [0, 30_000, 0, 10_000, 0]);
+    }
+
+    #[test]
+    fn picks_follow_the_weights() {
+        let weights = [0.0, 3.0, 0.0, 1.0];
+        let counts = (0..4000).fold([0; 4], |mut counts, i| {
+            counts[pick(weights.into_iter(), (f64::from(i) + 0.5) / 4000.0).expect("within the weights")] += 1;
+            counts
+        });
+        assert_eq!(counts, [0, 3000, 0, 1000]);
+        assert_eq!(pick([0.0, 0.0].into_iter(), 0.5), None);
     }
 
     #[test]

@@ -6,7 +6,7 @@ pub mod measure;
 pub mod stream;
 pub mod warp;
 
-pub use discrete::Discrete;
+pub use discrete::{Discrete, pick};
 pub use frame::Frame;
 pub use measure::{AreaPdf, SolidAnglePdf, Walk};
 pub use stream::{Row, Stream};

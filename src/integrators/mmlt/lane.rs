@@ -1,6 +1,6 @@
 //! The chains of one lane, and what they do in a pass.
 
-use super::super::chains::{LANES, Mean};
+use super::super::chains::Mean;
 use super::{Family, Share};
 use crate::film::{Health, Kernel, Splats};
 use crate::markov::{
@@ -65,14 +65,19 @@ pub(super) struct Lane {
     controlled: ControlledMemory,
 }
 
-/// Where and how much a mutation adds.
-struct Target<'a> {
-    splats: &'a mut Splats,
+/// What the mutations of one length work on in a pass.
+struct Work<'a> {
+    scene: &'a Caster<'a>,
+    tracer: Tracer,
     kernel: &'a Kernel,
+    splats: &'a mut Splats,
+    /// What one mutation adds.
     worth: f64,
+    /// What large steps found.
+    large_steps: Mean,
 }
 
-impl Target<'_> {
+impl Work<'_> {
     #[inline]
     fn splat(&mut self, path: &Found, weight: f64) {
         if weight > 0.0 {
@@ -112,21 +117,28 @@ impl Lane {
         tracer.find(scene, s, state, stream, &mut self.proposal, &mut self.health)
     }
 
-    /// Runs each chain for the lane's part of the mutations. The first `mutations % LANES` turns take one more.
-    pub(super) fn run(&mut self, scene: &Scene, kernel: &Kernel, plan: &[Share], turn: u64, size: [usize; 2]) -> Job {
+    /// Runs each chain for the lane's part of the mutations, which `own` gives.
+    pub(super) fn run(
+        &mut self,
+        scene: &Scene,
+        kernel: &Kernel,
+        plan: &[Share],
+        own: impl Fn(u64) -> u64,
+        size: [usize; 2],
+    ) -> Job {
         let (caster, mut splats) = (Caster::new(scene), Splats::new(size));
         let mut chains = std::mem::take(&mut self.chains);
         let run = |(chain, share): (&mut Option<Chain>, &Share)| {
-            let mut large_steps = Mean::default();
-            let mutations = share.mutations / LANES as u64 + u64::from(turn < share.mutations % LANES as u64);
-            let mut target = Target { splats: &mut splats, kernel, worth: share.worth };
+            let Share { tracer, worth, mutations } = *share;
+            let (scene, splats) = (&caster, &mut splats);
+            let mut work = Work { scene, tracer, kernel, splats, worth, large_steps: Mean::default() };
             if let Some(chain) = chain {
-                for _ in 0..mutations {
-                    self.mutate(&caster, share.tracer, chain, &mut target, &mut large_steps);
+                for _ in 0..own(mutations) {
+                    self.mutate(chain, &mut work);
                 }
-                target.splat(&chain.current, std::mem::take(&mut chain.weight));
+                work.splat(&chain.current, std::mem::take(&mut chain.weight));
             }
-            large_steps
+            work.large_steps
         };
         let large_steps = chains.iter_mut().zip(plan).map(run).collect();
         self.chains = chains;
@@ -134,34 +146,27 @@ impl Lane {
     }
 
     /// One mutation; both states count with their expected weight.
-    fn mutate(
-        &mut self,
-        scene: &Caster<'_>,
-        tracer: Tracer,
-        chain: &mut Chain,
-        target: &mut Target<'_>,
-        large_steps: &mut Mean,
-    ) {
+    fn mutate(&mut self, chain: &mut Chain, work: &mut Work<'_>) {
         let kind = chain.stream.number();
         let large = self.mutations.large_step;
         if kind < large {
-            match self.mutations.tries(tracer.edges) {
-                true => self.try_all(scene, tracer, chain, target, large_steps),
-                false => self.large_step(scene, tracer, chain, target, large_steps),
-            }
-            return;
+            return match self.mutations.tries(work.tracer.edges) {
+                true => self.try_all(chain, work),
+                false => self.large_step(chain, work),
+            };
         }
         if self.family == Family::Jumping {
             let separate = self.mutations.jumps == Jumps::Separate;
-            if !separate || kind < large + self.mutations.jump {
-                self.jump(scene, chain);
+            let alone = separate && kind < large + self.mutations.jump;
+            if alone || !separate {
+                self.jump(work.scene, chain);
             }
-            if separate && kind < large + self.mutations.jump {
+            if alone {
                 chain.weight += 1.0;
                 return;
             }
         }
-        self.small_step(scene, tracer, chain, target);
+        self.small_step(chain, work);
     }
 
     /// Another technique for the same path.
@@ -177,71 +182,54 @@ impl Lane {
         }
     }
 
-    fn large_step(
-        &mut self,
-        scene: &Caster<'_>,
-        tracer: Tracer,
-        chain: &mut Chain,
-        target: &mut Target<'_>,
-        large_steps: &mut Mean,
-    ) {
+    fn large_step(&mut self, chain: &mut Chain, work: &mut Work<'_>) {
         chain.state.propose(true);
-        let proposal = self.find(scene, tracer, &mut chain.state, &mut chain.stream);
+        let proposal = self.find(work.scene, work.tracer, &mut chain.state, &mut chain.stream);
         let luminance = proposal.map_or(0.0, |found| found.luminance);
-        large_steps.add(luminance);
+        work.large_steps.add(luminance);
         let ratio = luminance / chain.current.luminance;
-        self.decide(chain, LARGE, proposal, ratio, target);
+        self.decide(chain, LARGE, proposal, ratio, work);
     }
 
-    fn small_step(&mut self, scene: &Caster<'_>, tracer: Tracer, chain: &mut Chain, target: &mut Target<'_>) {
+    fn small_step(&mut self, chain: &mut Chain, work: &mut Work<'_>) {
         chain.state.propose(false);
         let Chain { state, stream, current, path, .. } = chain;
-        let (before, mut technique, mut correction) = (current.technique, current.technique, 1.0);
-        let proposal = if self.mutations.controlled {
-            let Self { proposal, health, controlled, .. } = self;
+        let Work { scene, tracer, .. } = *work;
+        let Self { proposal, health, controlled, family, .. } = self;
+        let before = current.technique;
+        let (technique, found) = if self.mutations.controlled {
             let found = controlled_step(tracer, scene, (path, current), state, stream, proposal, health, controlled);
-            found.map(|(found, ratio)| {
-                correction = ratio;
-                found
-            })
+            (before, found)
         } else {
-            match self.family {
-                Family::Multiplexed => {
-                    technique = tracer.technique(state.row(Tracer::TECHNIQUE_ROW, stream)[0]);
-                    self.find(scene, tracer, state, stream)
-                }
-                Family::Jumping => tracer.find(scene, before, state, stream, &mut self.proposal, &mut self.health),
-            }
+            let technique = match family {
+                Family::Multiplexed => tracer.technique(state.row(Tracer::TECHNIQUE_ROW, stream)[0]),
+                Family::Jumping => before,
+            };
+            let found = tracer.find(scene, technique, state, stream, proposal, health);
+            (technique, found.map(|found| (found, 1.0)))
         };
-        let luminance = proposal.map_or(0.0, |found| found.luminance);
-        let ratio = correction * luminance / chain.current.luminance;
-        let accepted = self.decide(chain, SMALL, proposal, ratio, target);
+        let ratio = found.map_or(0.0, |(found, correction)| correction * found.luminance / current.luminance);
+        let accepted = self.decide(chain, SMALL, found.map(|(found, _)| found), ratio, work);
         if technique != before {
             chain.tally(CHANGE, accepted);
         }
     }
 
     /// A large step among all techniques.
-    fn try_all(
-        &mut self,
-        scene: &Caster<'_>,
-        tracer: Tracer,
-        chain: &mut Chain,
-        target: &mut Target<'_>,
-        large_steps: &mut Mean,
-    ) {
+    fn try_all(&mut self, chain: &mut Chain, work: &mut Work<'_>) {
         let Chain { state, stream, current, .. } = chain;
+        let Work { scene, tracer, .. } = *work;
         let known = Some(current.technique);
         let before = current.luminance + self.tries.sum(tracer, scene, known, state, stream, &mut self.health);
         state.propose(true);
         let sum = self.tries.sum(tracer, scene, None, state, stream, &mut self.health);
-        large_steps.add(sum / tracer.techniques() as f64);
+        work.large_steps.add(sum / tracer.techniques() as f64);
         let proposal = self.tries.choose(tracer, stream, &mut self.proposal);
         if let (Some(found), Family::Multiplexed) = (&proposal, self.family) {
             let number = (found.technique as f64 + stream.number()) / tracer.techniques() as f64;
             state.set(Tracer::TECHNIQUE_ROW, [number, 0.0, 0.0, 0.0]);
         }
-        self.decide(chain, LARGE, proposal, sum / before, target);
+        self.decide(chain, LARGE, proposal, sum / before, work);
     }
 
     /// Accepts or rejects the proposal, whose acceptance is `ratio`; says which.
@@ -252,7 +240,7 @@ impl Lane {
         kind: usize,
         proposal: Option<Found>,
         ratio: f64,
-        target: &mut Target<'_>,
+        work: &mut Work<'_>,
     ) -> bool {
         let acceptance = if proposal.is_some() { ratio.min(1.0) } else { 0.0 };
         chain.weight += 1.0 - acceptance;
@@ -263,12 +251,12 @@ impl Lane {
             return false;
         };
         if accepted {
-            target.splat(&chain.current, std::mem::replace(&mut chain.weight, acceptance));
+            work.splat(&chain.current, std::mem::replace(&mut chain.weight, acceptance));
             chain.current = found;
             chain.state.accept();
             std::mem::swap(&mut chain.path, &mut self.proposal);
         } else {
-            target.splat(&found, acceptance);
+            work.splat(&found, acceptance);
             chain.state.reject();
         }
         accepted

@@ -12,7 +12,7 @@
 
 mod lane;
 
-use super::chains::{LANES, Mean, batch_samples, independent};
+use super::chains::{LANES, Mean, batch_samples, independent, share};
 use super::{Acceptance, ChainReport, Counts, path::Path, render::Settings};
 use crate::film::{Film, Splats};
 use crate::markov::{ChainState, Mutations, Scales, Tracer};
@@ -62,7 +62,7 @@ pub(super) struct Mmlt {
 impl Mmlt {
     pub(super) fn start(scene: &Scene, settings: &Settings, family: Family) -> Self {
         let mutations = settings.mutations;
-        let direct = if mutations.separate_direct { 2 } else { 1 };
+        let direct = mutations.traced_edges();
         let size = scene.camera.size;
         let lengths: Vec<Length> = (direct + 1..=settings.max_depth)
             .map(|edges| {
@@ -113,12 +113,12 @@ impl Mmlt {
     /// How this pass divides one mutation per pixel among the lengths: in proportion to their light.
     fn plan(&self, pixels: f64) -> Vec<Share> {
         let total: f64 = self.lengths.iter().map(|length| length.mean.mean()).sum();
-        let share = |length: &Length| {
+        let part = |length: &Length| {
             let b = length.mean.mean();
             let mutations = if b > 0.0 { (b / total * pixels).ceil() } else { 0.0 };
             Share { tracer: length.tracer, mutations: mutations as u64, worth: b * pixels / mutations.max(1.0) }
         };
-        self.lengths.iter().map(share).collect()
+        self.lengths.iter().map(part).collect()
     }
 
     pub(super) fn pass(&mut self, scene: &Scene, film: &mut Film, pass: u64, counts: &mut Counts) {
@@ -134,11 +134,7 @@ impl Mmlt {
             .lanes
             .par_iter_mut()
             .enumerate()
-            .map(|(number, lane)| {
-                // What does not divide evenly goes round the lanes from pass to pass.
-                let turn = (number as u64 + pass) % LANES as u64;
-                lane.run(scene, &kernel, &plan, turn, size)
-            })
+            .map(|(number, lane)| lane.run(scene, &kernel, &plan, |mutations| share(mutations, number, pass), size))
             .collect();
         for job in &jobs {
             film.report(&job.health);
