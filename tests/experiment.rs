@@ -53,10 +53,23 @@ fn experiments_are_made_once() {
     assert!(run["mse"].as_f64().unwrap() > 0.0 && run["acceptance"]["small_step"][0]["length"] == 3, "{run}");
 }
 
+/// Another reference is another truth: nothing of the errors against the first is kept.
+#[test]
+fn another_reference_is_made_anew() {
+    let folder = tempfile::tempdir().unwrap();
+    for time in ["time = 0.1", "time = 0.2"] {
+        fs::write(folder.path().join("small.toml"), recipe(|text| text.replace("time = 0.1", time))).unwrap();
+        let (success, _, log) = pathblend(folder.path(), &["experiment", "small.toml", "-o", "out"]);
+        assert!(success && log.lines().count() == 9, "{log}");
+    }
+}
+
 #[test]
 fn bad_recipes_are_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let cases: [(&str, &str, &[&str]); 8] = [
+    let twice = format!("[[scenes]]\nfile = {:?}\n[[scenes]]\n", scene("box"));
+    let cases: [(&str, &str, &[&str]); 9] = [
+        ("[[scenes]]\n", &twice, &["two scenes", "`box`"]),
         ("seeds = 2", "seeds = 1", &["seeds", "at least 2"]),
         ("[0.02, 0.05]", "[]", &["times"]),
         ("[0.02, 0.05]", "[-1.0]", &["times"]),

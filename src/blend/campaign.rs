@@ -73,6 +73,20 @@ impl RecipeScene {
         let folder = self.file.parent().and_then(Path::file_name).unwrap_or(self.file.as_os_str());
         folder.to_string_lossy().into_owned()
     }
+
+    /// Fails where two scenes have one name.
+    pub(crate) fn tell_apart(scenes: &[Self]) -> Result<(), String> {
+        match repeated(scenes.iter().map(Self::name)) {
+            Some(name) => Err(format!("two scenes are called `{name}` after their folder; expected one")),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A name that occurs more than once.
+pub(crate) fn repeated(names: impl Iterator<Item = String>) -> Option<String> {
+    let mut seen = std::collections::BTreeSet::new();
+    names.into_iter().find(|name| !seen.insert(name.clone()))
 }
 
 /// What a campaign found.
@@ -122,13 +136,9 @@ impl Recipe {
                 return Err(fail("expected a reference time from 0 to 1e7".into()));
             }
         }
-        let mut names: Vec<String> = recipe.scenes.iter().map(RecipeScene::name).collect();
-        names.sort();
-        if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Err(fail(format!("two scenes are called `{}` after their folder; expected one", twice[0])));
-        }
-        if names.len() < 2 {
-            return Err(BlendError::TooFewScenes { found: names.len() });
+        RecipeScene::tell_apart(&recipe.scenes).map_err(fail)?;
+        if recipe.scenes.len() < 2 {
+            return Err(BlendError::TooFewScenes { found: recipe.scenes.len() });
         }
         recipe.learning.rows.check()?;
         recipe.learning.forest.check()?;

@@ -20,6 +20,7 @@ mod weights;
 
 pub use apply::{Classes, apply, weight_layer, weight_map};
 pub use builtin::builtin;
+pub(crate) use campaign::repeated;
 pub use campaign::{Findings, Recipe, RecipeScene, Reference};
 pub use error::BlendError;
 pub use evaluate::{Options, Pair, leave_one_out};

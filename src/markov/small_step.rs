@@ -47,6 +47,7 @@ impl SmallStep {
     }
 
     /// `number` after `steps` steps, each `scale` times as far.
+    #[inline]
     pub fn moved(&self, number: f64, scale: f64, steps: u64, stream: &mut Stream) -> f64 {
         match *self {
             Self::Gaussian { deviation } => {
@@ -70,15 +71,8 @@ impl SmallStep {
     /// Moves the numbers of a row, each as far as its scale says.
     #[inline]
     pub fn move_row(&self, row: &mut Row, scales: &Scales, steps: u64, stream: &mut Stream) {
-        if let (Self::Gaussian { deviation }, 1) = (*self, steps) {
-            // The usual case without a branch on the distribution for each number.
-            for (number, scale) in row.iter_mut().zip(scales).filter(|(_, scale)| **scale > 0.0) {
-                *number = wrap(*number + deviation * scale * stream.normal());
-            }
-        } else {
-            for (number, scale) in row.iter_mut().zip(scales).filter(|(_, scale)| **scale > 0.0) {
-                *number = self.moved(*number, *scale, steps, stream);
-            }
+        for (number, scale) in row.iter_mut().zip(scales).filter(|(_, scale)| **scale > 0.0) {
+            *number = self.moved(*number, *scale, steps, stream);
         }
     }
 

@@ -18,7 +18,7 @@ const REFERENCE_SEED: u64 = 1 << 40;
 /// One run.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct Run {
-    /// What decides the run: scene, variant, seed, time and the renderer's sources.
+    /// Fingerprint of what decides the run: scene, variant, seed, time, reference and the renderer's sources.
     pub key: String,
     /// Name of the scene.
     pub scene: String,
@@ -98,7 +98,9 @@ impl ExperimentRecipe {
             let name = entry.name();
             let reference = entry.reference.unwrap_or(self.reference);
             let depth = scene.max_depth;
-            let target = output.join(format!("{name}-{}-{depth}.exr", &scene.hash[..16]));
+            let how = format!("{} {depth} {} {}", scene.hash, reference.integrator.name(), reference.time);
+            let how = fingerprint(&how);
+            let target = output.join(format!("{name}-{how}.exr"));
             if !target.exists() {
                 log(&format!("{name}: reference by {} for {} s", reference.integrator.name(), reference.time));
                 let settings = Settings {
@@ -111,15 +113,15 @@ impl ExperimentRecipe {
                     .image
                     .write(&target, &WriteOptions::default())?;
             }
-            let reference = Image::read(&target)?;
+            let image = Image::read(&target)?;
             // Seeds outermost, so that what the machine does meanwhile falls on all variants.
             for seed in 0..self.seeds {
                 for time in &self.times {
                     for variant in &self.variants {
-                        let key = key(&scene, variant, seed, *time);
+                        let key = key(&scene, variant, seed, *time, &how);
                         if !kept.runs.contains_key(&key) {
                             log(&format!("{name}: {} for {time} s, seed {seed}", variant.name));
-                            kept.add(&one(&scene, &name, variant, seed, *time, key.clone(), &reference)?)?;
+                            kept.add(&one(&scene, &name, variant, seed, *time, key.clone(), &image)?)?;
                         }
                         runs.extend(kept.runs.get(&key).cloned());
                     }
@@ -132,13 +134,19 @@ impl ExperimentRecipe {
     }
 }
 
-fn key(scene: &Scene, variant: &Variant, seed: u64, time: f64) -> String {
+/// What tells one thing that is kept from another.
+fn fingerprint(all: &str) -> String {
+    blake3::hash(all.as_bytes()).to_hex()[..24].to_owned()
+}
+
+/// Decided by all that decides the run's errors; `reference` is the fingerprint of what it is compared with.
+fn key(scene: &Scene, variant: &Variant, seed: u64, time: f64, reference: &str) -> String {
     let Variant { integrator, mutations, .. } = variant;
     let mutations = serde_json::to_string(mutations).unwrap_or_default();
     let depth = scene.max_depth;
     let build = env!("PATHBLEND_RENDERER");
-    let all = format!("{build} {} {depth} {} {mutations} {seed} {time}", scene.hash, integrator.name());
-    blake3::hash(all.as_bytes()).to_hex()[..24].to_owned()
+    let method = integrator.name();
+    fingerprint(&format!("{build} {} {depth} {method} {mutations} {seed} {time} {reference}", scene.hash))
 }
 
 fn one(

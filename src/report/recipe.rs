@@ -1,7 +1,7 @@
 //! What an experiment is made of, as its TOML file has it.
 
 use super::ReportError;
-use crate::blend::{RecipeScene, Reference};
+use crate::blend::{RecipeScene, Reference, repeated};
 use crate::integrators::Method;
 use crate::markov::Mutations;
 use serde::{Deserialize, Serialize};
@@ -64,10 +64,9 @@ impl ExperimentRecipe {
                 return Err(fail("a reference needs a method without bias and a time above 0, at most 1e7".into()));
             }
         }
-        let mut names: Vec<&str> = recipe.variants.iter().map(|variant| variant.name.as_str()).collect();
-        names.sort_unstable();
-        if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Err(fail(format!("two variants are called `{}`; expected one", twice[0])));
+        RecipeScene::tell_apart(&recipe.scenes).map_err(fail)?;
+        if let Some(name) = repeated(recipe.variants.iter().map(|variant| variant.name.clone())) {
+            return Err(fail(format!("two variants are called `{name}`; expected one")));
         }
         for variant in &recipe.variants {
             variant.mutations.checked().map_err(|error| fail(format!("variant `{}`: {error}", variant.name)))?;
