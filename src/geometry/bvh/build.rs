@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use super::collapse::{Primitives, collapse};
 use super::frame::Frame;
 use super::groups::Groups;
+use super::pages::Pages;
 use super::traverse::FLAT_PACKETS;
 use super::{Bvh, Dropped};
 use crate::geometry::offset::cross;
@@ -47,9 +48,9 @@ pub fn build(vertices: &[Vec3], triangles: &[[u32; 3]], solids: &[Solid]) -> Bvh
     let primitives = Primitives { frame, vertices, indices: triangles, triangles: &kept, solids: &kept_solids };
     if kept.len() <= 8 * FLAT_PACKETS && kept_solids.len() <= LOOSE_SOLIDS {
         let numbers: Vec<u32> = (0..kept.len() as u32).collect();
-        let packets = numbers.chunks(8).map(|numbers| primitives.packet(numbers)).collect();
-        let solids = solids.to_vec();
-        return Bvh { frame, bounds, dropped, nodes: Vec::new(), packets, solids, loose: kept_solids, stack: 0 };
+        let packets = Pages::new(numbers.chunks(8).map(|numbers| primitives.packet(numbers)).collect());
+        let (nodes, solids) = (Pages::new(Vec::new()), solids.to_vec());
+        return Bvh { frame, bounds, dropped, nodes, packets, solids, loose: kept_solids };
     }
     let count = kept.len();
     let bounding = |i: usize| match i.checked_sub(count) {
@@ -65,8 +66,9 @@ pub fn build(vertices: &[Vec3], triangles: &[[u32; 3]], solids: &[Solid]) -> Bvh
     // Sets the bound on the memory that a scene takes to load: what is not needed again goes before more is made.
     drop(boxes);
     let wide = collapse(&tree, &groups, &primitives, bounding);
-    let (stack, solids) = (7 * wide.depth + 1, solids.to_vec());
-    Bvh { frame, bounds, dropped, nodes: wide.nodes, packets: wide.packets, solids, loose: Vec::new(), stack }
+    drop((tree, groups));
+    let (nodes, packets) = (Pages::new(wide.nodes), Pages::new(wide.packets));
+    Bvh { frame, bounds, dropped, nodes, packets, solids: solids.to_vec(), loose: Vec::new() }
 }
 
 /// Whether a triangle can be hit; if not, it is counted.

@@ -1,7 +1,7 @@
 //! A bounding volume hierarchy, eight children wide, over packets of up to eight triangles and analytic solids.
 //!
 //! The walk: [`build`] drops what cannot be hit, puts equal boxes together ([`groups`]) and lets obvhs build a binary hierarchy, [`collapse`] turns it into wide
-//! nodes ([`wide`]) and packets ([`packet`]), [`traverse`] carries a ray's constants ([`query`]) through them.
+//! nodes ([`wide`]) and packets ([`packet`]) in large pages ([`pages`]), [`traverse`] carries a ray's constants ([`query`]) through them.
 //!
 //! A handful of primitives gets no nodes at all: a flat list of packets is faster.
 //!
@@ -13,6 +13,7 @@ mod collapse;
 mod frame;
 mod groups;
 mod packet;
+mod pages;
 mod query;
 mod traverse;
 mod wide;
@@ -22,6 +23,7 @@ use glam::Vec3;
 use super::{Bounds, Hit, Ray, Solid};
 use frame::Frame;
 use packet::Packet;
+use pages::Pages;
 use wide::Node;
 
 /// The index of no triangle: for rays that start on something else.
@@ -38,18 +40,16 @@ pub struct Dropped {
 }
 
 /// The hierarchy; holds its own copy of the geometry. Immutable and shared between threads.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Bvh {
     frame: Frame,
     bounds: Bounds,
     dropped: Dropped,
-    nodes: Vec<Node>,
-    packets: Vec<Packet>,
+    nodes: Pages<Node>,
+    packets: Pages<Packet>,
     solids: Vec<Solid>,
     /// Indices of the solids that a hierarchy without nodes tests one by one.
     loose: Vec<u32>,
-    /// The most entries that a traversal can have on its stack; 0 if there are no nodes.
-    stack: usize,
 }
 
 impl Bvh {

@@ -4,6 +4,7 @@
 //! fallback to `f64` on edges; here `f64` decides always, on the few triangles that the filter leaves, so that a ray
 //! leaving a surface next to an edge does not meet the neighbour by rounding.
 
+use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use wide::f32x8;
 
@@ -11,7 +12,8 @@ use super::query::Query;
 use crate::geometry::offset::cross;
 
 /// Eight triangles at most, in local units.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
 pub struct Packet {
     /// `vertices[vertex][axis]`; lanes without a triangle are NaN, which no comparison accepts.
     vertices: [[f32x8; 3]; 3],
@@ -21,6 +23,8 @@ pub struct Packet {
     magnitude: f32,
     /// Longest edge.
     edge: f32,
+    /// To the next multiple of the alignment.
+    rest: [u32; 6],
 }
 
 /// Distance (local units) and barycentric coordinates of vertices 1 and 2.
@@ -46,7 +50,7 @@ impl Packet {
                 edge = edge.max(point.distance(triangle[(vertex + 1) % 3]));
             }
         }
-        Self { vertices: lanes.map(|v| v.map(f32x8::new)), ids, magnitude, edge }
+        Self { vertices: lanes.map(|v| v.map(f32x8::new)), ids, magnitude, edge, rest: [0; 6] }
     }
 
     /// The lanes (bit mask) that may be hit at a distance of at most `limit` from the query's `f32` origin: all that

@@ -99,7 +99,7 @@ impl Query {
 
 /// The box test's constants, per axis.
 pub struct Slabs {
-    /// Which of a node's six planes come first along the ray; the others are these XOR 1.
+    /// Which of the two planes of a box comes first along the ray: 0 for the lower, 1 for the upper.
     pub near: [usize; 3],
     /// Inverse direction.
     pub inverse: Vec3,
@@ -120,8 +120,8 @@ impl Slabs {
             // By the sign of the inverse, which a direction of -0 has too.
             near: [
                 usize::from(d.x.is_sign_negative()),
-                2 + usize::from(d.y.is_sign_negative()),
-                4 + usize::from(d.z.is_sign_negative()),
+                usize::from(d.y.is_sign_negative()),
+                usize::from(d.z.is_sign_negative()),
             ],
             inverse,
             near_origin: inverse * (o + pad),

@@ -1,5 +1,8 @@
 //! The walk of a ray through the hierarchy. Nothing is allocated.
 
+use arrayvec::ArrayVec;
+use wide::f32x8;
+
 use super::Bvh;
 use super::packet::Packet;
 use super::query::Query;
@@ -9,8 +12,8 @@ use crate::geometry::{Primitive, Ray};
 /// Levels of wide nodes that [`super::collapse`] never exceeds.
 pub const MAX_DEPTH: usize = 36;
 /// Each level leaves at most seven siblings behind, and the last one eight.
-const FULL_STACK: usize = 256;
-const _: () = assert!(7 * MAX_DEPTH < FULL_STACK);
+const STACK: usize = 256;
+const _: () = assert!(7 * MAX_DEPTH < STACK);
 
 /// The most packets that do without nodes: one bit for each of their triangles.
 pub const FLAT_PACKETS: usize = 8;
@@ -48,15 +51,11 @@ const fn entry(t: f32, child: Child) -> u64 {
 }
 
 impl Bvh {
-    /// The closest hit, or with `ANY` the first one met. Small hierarchies get a small stack, which costs less to clear.
+    /// The closest hit, or with `ANY` the first one met.
     #[inline(always)]
     pub(super) fn dispatch<const ANY: bool>(&self, ray: &Ray, leaving: u32) -> Option<Best> {
         let query = Query::new(ray, leaving, &self.frame)?;
-        Some(match self.stack {
-            0 => self.flat::<ANY>(&query, ray),
-            1..=64 => self.traverse::<ANY, 64>(&query, ray),
-            _ => self.traverse::<ANY, FULL_STACK>(&query, ray),
-        })
+        Some(if self.nodes.is_empty() { self.flat::<ANY>(&query, ray) } else { self.traverse::<ANY>(&query, ray) })
     }
 
     /// Without nodes: all packets are filtered, then all candidates refined. No branch until then depends on the ray,
@@ -83,47 +82,44 @@ impl Bvh {
     }
 
     #[inline(always)]
-    fn traverse<const ANY: bool, const N: usize>(&self, query: &Query, ray: &Ray) -> Best {
+    fn traverse<const ANY: bool>(&self, query: &Query, ray: &Ray) -> Best {
+        let (nodes, packets) = (&*self.nodes, &*self.packets);
         let mut best = Best::new(query);
-        let mut stack = [0u64; N];
-        let mut top = 0;
+        let mut stack = ArrayVec::<u64, STACK>::new_const();
         let mut child = Child::node(0);
+        // A prefetch in safe code: reading one word of what waits on the stack brings it into the cache meanwhile.
+        let mut read = 0;
+        let mut touch = |child: Child| match child.kind() {
+            ChildKind::Node(index) => read ^= nodes.get(index).map_or(0, |node| node.children[0].0),
+            ChildKind::Packet(index) => read ^= packets.get(index).map_or(0, |packet| packet.ids[0]),
+            ChildKind::Solid(_) => {}
+        };
         loop {
             match child.kind() {
                 ChildKind::Node(index) => {
-                    if let Some(node) = self.nodes.get(index) {
-                        let (mask, enter) = node.enter(query, best.t32);
-                        top = push::<N>(&mut stack, top, mask, enter.as_array(), &node.children);
+                    let node = &nodes[index];
+                    let (mask, enter) = node.enter(query, best.t32);
+                    if let Some(nearest) = nearest(&mut stack, mask, &enter, &node.children, &mut touch) {
+                        child = nearest;
+                        continue;
                     }
                 }
-                ChildKind::Packet(index) => self.visit_packet::<ANY>(index, query, &mut best),
+                ChildKind::Packet(index) => visit_packet::<ANY>(&packets[index], query, &mut best),
                 ChildKind::Solid(index) => self.visit_solid(index, query, ray, &mut best),
             }
             if ANY && best.primitive.is_some() {
                 return best;
             }
             loop {
-                if top == 0 {
+                let Some(next) = stack.pop() else {
+                    std::hint::black_box(read);
                     return best;
-                }
-                top -= 1;
-                let next = stack[top];
+                };
                 if f32::from_bits((next >> 32) as u32) <= best.t32 {
                     child = Child(next as u32);
                     break;
                 }
             }
-        }
-    }
-
-    #[inline(always)]
-    fn visit_packet<const ANY: bool>(&self, index: usize, query: &Query, best: &mut Best) {
-        let packet = &self.packets[index];
-        let mut mask = packet.filter(query, best.t32);
-        while mask != 0 && !(ANY && best.primitive.is_some()) {
-            let lane = mask.trailing_zeros() as usize;
-            mask &= mask - 1;
-            refine(packet, lane, query, best);
         }
     }
 
@@ -135,6 +131,16 @@ impl Bvh {
             best.set(query, t * self.frame.scale);
             best.primitive = Some(Primitive::Solid { index });
         }
+    }
+}
+
+#[inline(always)]
+fn visit_packet<const ANY: bool>(packet: &Packet, query: &Query, best: &mut Best) {
+    let mut mask = packet.filter(query, best.t32);
+    while mask != 0 && !(ANY && best.primitive.is_some()) {
+        let lane = mask.trailing_zeros() as usize;
+        mask &= mask - 1;
+        refine(packet, lane, query, best);
     }
 }
 
@@ -150,27 +156,38 @@ fn refine(packet: &Packet, lane: usize, query: &Query, best: &mut Best) {
     }
 }
 
-/// Puts the entered children on the stack, the nearest on top; gives the new top.
+/// The nearest of the entered children; the others go onto the stack, the nearer above. Most nodes have one or two.
 #[inline(always)]
-fn push<const N: usize>(
-    stack: &mut [u64; N],
-    top: usize,
+fn nearest(
+    stack: &mut ArrayVec<u64, STACK>,
     mut mask: u32,
-    enter: &[f32; 8],
+    enter: &f32x8,
     children: &[Child; 8],
-) -> usize {
-    let mut end = top;
-    while mask != 0 {
-        let lane = mask.trailing_zeros() as usize & 7;
-        mask &= mask - 1;
-        let new = entry(enter[lane], children[lane]);
-        let mut place = end;
-        while place > top && stack[place - 1] < new {
-            stack[place] = stack[place - 1];
-            place -= 1;
-        }
-        stack[place] = new;
-        end += 1;
+    mut touch: impl FnMut(Child),
+) -> Option<Child> {
+    let mut next = || {
+        let lane = (mask != 0).then_some(mask.trailing_zeros() as usize & 7);
+        mask &= mask.wrapping_sub(1);
+        lane
+    };
+    let (first, second) = (next()?, next());
+    if second.is_none() {
+        return Some(children[first]);
     }
-    end
+    let enter = enter.as_array();
+    let mut nearest = entry(enter[first], children[first]);
+    let bottom = stack.len();
+    let mut lane = second;
+    while let Some(index) = lane {
+        let new = entry(enter[index], children[index]);
+        let mut far = new.max(nearest);
+        nearest = new.min(nearest);
+        touch(Child(far as u32));
+        for place in &mut stack[bottom..] {
+            (*place, far) = (far.max(*place), far.min(*place));
+        }
+        stack.push(far);
+        lane = next();
+    }
+    Some(Child(nearest as u32))
 }

@@ -1,11 +1,13 @@
 //! A node with eight children, one per SIMD lane.
 
+use bytemuck::{Pod, Zeroable};
 use wide::f32x8;
 
 use super::query::Query;
 
 /// What a node's child is: a kind in the upper two bits, an index in the rest.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(transparent)]
 pub struct Child(pub u32);
 
 /// [`Child`], taken apart.
@@ -48,10 +50,11 @@ impl Child {
 }
 
 /// Eight boxes and what is in them. Lanes without a child have the empty box and are never entered.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
 pub struct Node {
-    /// Smallest x, largest x, smallest y, …: `planes[2 axis + side]`, in local units.
-    planes: [f32x8; 6],
+    /// Smallest x, largest x, smallest y, …: `planes[axis][side]`, in local units.
+    planes: [[f32x8; 2]; 3],
     /// The children.
     pub children: [Child; 8],
 }
@@ -59,16 +62,16 @@ pub struct Node {
 impl Node {
     /// A node of up to eight children with boxes `(min, max)`; further ones are ignored.
     pub fn new(children: &[(Child, [f32; 3], [f32; 3])]) -> Self {
-        let mut planes = [[f32::INFINITY; 8], [f32::NEG_INFINITY; 8]].repeat(3);
+        let mut planes = [[[f32::INFINITY; 8], [f32::NEG_INFINITY; 8]]; 3];
         let mut ids = [Child::node(0); 8];
         for (lane, (child, min, max)) in children.iter().enumerate().take(8) {
             ids[lane] = *child;
             for axis in 0..3 {
-                planes[2 * axis][lane] = min[axis];
-                planes[2 * axis + 1][lane] = max[axis];
+                planes[axis][0][lane] = min[axis];
+                planes[axis][1][lane] = max[axis];
             }
         }
-        Self { planes: std::array::from_fn(|i| f32x8::new(planes[i])), children: ids }
+        Self { planes: planes.map(|sides| sides.map(f32x8::new)), children: ids }
     }
 
     /// The lanes whose box the ray meets before `limit` (bit mask) and where it enters them.
@@ -83,8 +86,8 @@ impl Node {
         let (x, y, z) = (slabs.inverse.x, slabs.inverse.y, slabs.inverse.z);
         let inverse = [f32x8::splat(x), f32x8::splat(y), f32x8::splat(z)];
         let (near_origin, far_origin) = (slabs.near_origin.to_array(), slabs.far_origin.to_array());
-        let near = |i: usize| self.planes[slabs.near[i]].mul_sub(inverse[i], f32x8::splat(near_origin[i]));
-        let far = |i: usize| self.planes[slabs.near[i] ^ 1].mul_sub(inverse[i], f32x8::splat(far_origin[i]));
+        let near = |i: usize| self.planes[i][slabs.near[i] & 1].mul_sub(inverse[i], f32x8::splat(near_origin[i]));
+        let far = |i: usize| self.planes[i][!slabs.near[i] & 1].mul_sub(inverse[i], f32x8::splat(far_origin[i]));
         let enter = near(0).fast_max(near(1)).fast_max(near(2).fast_max(f32x8::ZERO));
         let leave = far(0).fast_min(far(1)).fast_min(far(2).fast_min(f32x8::splat(limit)));
         (enter.simd_le(leave * f32x8::splat(SLACK)).to_bitmask(), enter)
