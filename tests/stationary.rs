@@ -34,6 +34,18 @@ fn scene() -> Scene {
     build(builder, pinhole(SIZE, 0.7, DVec3::new(0.0, 0.0, 0.95), -DVec3::Z), 5)
 }
 
+/// A ball close before the camera, within a hollow one: where a walk arrives elsewhere on them, the same direction has
+/// quite other numbers.
+fn balls() -> Scene {
+    let mut builder = Builder::new();
+    let wall = builder.bsdf(Bsdf::TwoSided(Box::new([diffuse(0.8), diffuse(0.8)])));
+    builder.solid(Solid::sphere(DVec3::ZERO, 1.3), wall, None).unwrap();
+    builder.solid(Solid::sphere(DVec3::new(0.0, -0.1, 0.0), 0.6), wall, None).unwrap();
+    let lamp = Solid::disk(DVec3::new(0.2, 0.95, 0.4), -DVec3::Y, 0.4);
+    builder.solid(lamp, wall, Some(Spectrum::grey(5.0).into())).unwrap();
+    build(builder, pinhole(SIZE, 0.6, DVec3::new(0.0, 0.2, 0.95), DVec3::new(0.0, -0.2, -1.0).normalize()), 4)
+}
+
 /// The light of one class in each quarter of the image.
 fn quarters(images: &[Image], class: &str) -> Vec<Estimate> {
     let quarter = |image: &Image, [left, top]: [usize; 2]| match image.layers.get(class) {
@@ -83,8 +95,8 @@ struct Part {
 }
 
 /// The parts that have a twenty-fifth of the light of their length at least: of a thousand chains forty begin there.
-fn parts(scene: &Scene) -> Vec<Part> {
-    let truth = images(scene, Method::Bdpt, 150);
+fn parts(scene: &Scene, passes: u64) -> Vec<Part> {
+    let truth = images(scene, Method::Bdpt, passes);
     let classes = truth[0].layers.keys().filter(|name| name.starts_with("path_"));
     let part = |class: &String| {
         let quarters = quarters(&truth, class).into_iter().enumerate();
@@ -98,16 +110,35 @@ fn parts(scene: &Scene) -> Vec<Part> {
     parts.into_iter().filter(|part| part.light.mean > 0.04 * totals[part.class.len()]).collect()
 }
 
+/// Wide controlled steps.
+fn controlled() -> Vec<(&'static str, Method, Mutations)> {
+    let small_step = SmallStep::Gaussian { deviation: 0.1 };
+    let wide = Mutations { large_step: 0.0, jump: 0.0, controlled: true, small_step, ..Mutations::default() };
+    vec![
+        ("wide controlled steps", Method::Mmlt, wide),
+        ("wide controlled steps and jumps", Method::Rjmlt, Mutations { jump: 0.3, ..wide }),
+    ]
+}
+
 #[test]
 fn mutations_keep_the_distribution() {
-    let scene = scene();
-    let parts = parts(&scene);
-    assert!(parts.len() > 16, "{} parts", parts.len());
+    keep(&scene(), cases(), 150);
+}
+
+#[test]
+fn controlled_steps_keep_the_distribution_on_balls() {
+    keep(&balls(), controlled(), 1800);
+}
+
+/// `passes` of bdpt tell what is right, and as many of each case are judged.
+fn keep(scene: &Scene, cases: Vec<(&'static str, Method, Mutations)>, passes: u64) {
+    let parts = parts(scene, passes);
+    assert!(parts.len() > 8, "{} parts", parts.len());
     let mut failures = Vec::new();
-    for (name, method, mutations) in cases() {
-        let passes = if method == Method::Pssmlt { 40 } else { 150 };
+    for (name, method, mutations) in cases {
+        let passes = if method == Method::Pssmlt { 40 } else { passes };
         let settings = Settings { budget: Budget::Passes(passes), mutations, ..Settings::default() };
-        let found = images_with(&scene, method, 64, settings);
+        let found = images_with(scene, method, 64, settings);
         let mut worst = (0.0, String::new());
         for Part { class, quarter, light } in &parts {
             let own = quarters(&found, class)[*quarter];
