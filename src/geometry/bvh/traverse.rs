@@ -62,15 +62,16 @@ impl Bvh {
     /// which for a few packets is faster than any hierarchy.
     #[inline(always)]
     fn flat<const ANY: bool>(&self, query: &Query, ray: &Ray) -> Best {
+        let packets = &*self.packets;
         let mut best = Best::new(query);
         let mut candidates = 0u64;
-        for (index, packet) in self.packets.iter().enumerate().take(FLAT_PACKETS) {
+        for (index, packet) in packets.iter().enumerate().take(FLAT_PACKETS) {
             candidates |= u64::from(packet.filter(query, best.t32)) << (8 * index);
         }
         while candidates != 0 && !(ANY && best.primitive.is_some()) {
             let bit = candidates.trailing_zeros() as usize;
             candidates &= candidates - 1;
-            refine(&self.packets[bit / 8], bit % 8, query, &mut best);
+            refine(&packets[bit / 8], bit % 8, query, &mut best);
         }
         for solid in &self.loose {
             if ANY && best.primitive.is_some() {
