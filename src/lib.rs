@@ -13,6 +13,7 @@ pub mod image;
 pub mod import;
 pub mod integrators;
 pub mod load;
+pub mod manifold;
 pub mod markov;
 pub mod math;
 pub mod paths;

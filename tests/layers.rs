@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 /// The rooms, lowest first. Rooms on one line may use each other's types only downwards in the order given.
-const ROOMS: [&str; 20] = [
+const ROOMS: [&str; 21] = [
     "math",
     "spectrum",
     "forest",
@@ -20,6 +20,7 @@ const ROOMS: [&str; 20] = [
     "scene",
     "load",
     "import",
+    "manifold",
     "paths",
     "markov",
     "integrators",

@@ -92,6 +92,29 @@ impl Bsdf {
         }
     }
 
+    /// Refractive index on the side away from the normal over that on the normal's, if there is one smooth or rough
+    /// boundary that bends light which passes.
+    pub fn refractive_index(&self) -> Option<f64> {
+        match self {
+            Self::Dielectric(glass) => Some(glass.eta),
+            Self::RoughDielectric(rough) => Some(rough.eta),
+            Self::Turned(bsdf) => bsdf.refractive_index().map(f64::recip),
+            Self::Mask(mask) => mask.nested.refractive_index(),
+            Self::Blend(blend) => blend.nested.iter().find_map(Self::refractive_index),
+            Self::Diffuse(_)
+            | Self::Conductor(_)
+            | Self::RoughConductor(_)
+            | Self::ThinDielectric(_)
+            | Self::Null
+            | Self::Plastic(_)
+            | Self::RoughPlastic(_)
+            | Self::Phong(_)
+            | Self::Principled(_)
+            | Self::Coating(_)
+            | Self::TwoSided(_) => None,
+        }
+    }
+
     /// Whether it is the same for directions turned about the normal, so that the tangent does not matter.
     pub fn is_isotropic(&self) -> bool {
         match self {

@@ -43,7 +43,7 @@ pub enum Start {
         normal: DVec3,
         /// Texture coordinates.
         uv: DVec2,
-        /// The triangle of the scene that it lies on, or [`crate::geometry::NO_TRIANGLE`].
+        /// The triangle of the scene that it lies on; means nothing on solids.
         triangle: u32,
     },
     /// At an isolated point, which no ray can hit.

@@ -13,7 +13,7 @@ use std::ops::Deref;
 pub struct Origin {
     /// The point, moved off the surface that it lies on.
     pub point: DVec3,
-    /// The triangle that it was on, or [`NO_TRIANGLE`].
+    /// The triangle that it was on; any other number on none.
     pub triangle: u32,
 }
 

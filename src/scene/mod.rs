@@ -2,18 +2,20 @@
 
 mod builder;
 mod caster;
+mod patch;
 mod relief;
 mod surface;
 mod tilted;
 
 pub use builder::{Builder, FilmSpec, Mesh, SceneError, Shine};
 pub use caster::{Caster, Origin};
-pub use surface::Surface;
+pub use patch::Patch;
+pub use surface::{SOLID, Surface};
 
 use crate::bsdf::Bsdf;
 use crate::camera::Camera;
 use crate::emitter::{Emitter, LightTree, Start};
-use crate::geometry::{Bvh, NO_TRIANGLE, Primitive, Ray, Solid, SurfacePoint, offset};
+use crate::geometry::{Bvh, Primitive, Ray, Solid, SurfacePoint, offset};
 use crate::math::{AreaPdf, Discrete, Frame, Row};
 use crate::texture::{Relief, Site, attribute};
 use glam::{DVec2, DVec3, Vec2, Vec3};
@@ -132,9 +134,9 @@ impl Scene {
                 (frame, up) = self.orient(shading, bsdf, [uv, mapped], derivatives);
             }
         }
-        let (position, triangle) = (a * w + b * u + c * v, index as u32);
+        let (position, primitive) = (a * w + b * u + c * v, index as u32);
         let offset = offset::of_triangle(a, b, c);
-        Surface { position, geometric: normal, frame, up, site, bsdf, emitter, offset, triangle }
+        Surface { position, geometric: normal, frame, up, site, bsdf, emitter, offset, primitive }
     }
 
     /// The shading frame where it has to follow the texture coordinates, and `normal` in it. `at` are the place where
@@ -162,7 +164,8 @@ impl Scene {
                 (frame, up) = self.orient(normal, bsdf, [chart.uv; 2], chart.derivatives);
             }
         }
-        Surface { position, geometric: normal, frame, up, site, bsdf, emitter, offset, triangle: NO_TRIANGLE }
+        let primitive = SOLID | index as u32;
+        Surface { position, geometric: normal, frame, up, site, bsdf, emitter, offset, primitive }
     }
 
     /// The scattering model `id`.

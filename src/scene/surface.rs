@@ -6,6 +6,9 @@ use crate::math::Frame;
 use crate::texture::Site;
 use glam::DVec3;
 
+/// The bit of [`Surface::primitive`] that tells solids from triangles.
+pub const SOLID: u32 = 1 << 31;
+
 /// A point on a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface {
@@ -25,16 +28,16 @@ pub struct Surface {
     pub emitter: Option<EmitterId>,
     /// Distance by which rays are started off the surface.
     pub offset: f64,
-    /// Index of the triangle that it lies on, or [`crate::geometry::NO_TRIANGLE`].
-    pub triangle: u32,
+    /// Index of the triangle that it lies on, or [`SOLID`] and that of the solid.
+    pub primitive: u32,
 }
 
 impl Surface {
     /// Where light starts that a walk from the camera has met here.
     #[inline]
     pub fn start(&self) -> Start {
-        let Self { position, geometric: normal, site, triangle, .. } = *self;
-        Start::Surface { position, normal, uv: site.uv, triangle }
+        let Self { position, geometric: normal, site, primitive, .. } = *self;
+        Start::Surface { position, normal, uv: site.uv, triangle: primitive }
     }
 
     /// Where a ray starts that leaves towards `direction`: moved off the surface by more than the rounding errors of
@@ -42,6 +45,6 @@ impl Surface {
     #[inline]
     pub fn leave(&self, direction: DVec3) -> Origin {
         let point = self.position + self.geometric * self.offset.copysign(self.geometric.dot(direction));
-        Origin { point, triangle: self.triangle }
+        Origin { point, triangle: self.primitive }
     }
 }

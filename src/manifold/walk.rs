@@ -1,0 +1,204 @@
+//! Walks of a chain to a new end.
+
+use super::{Turn, derivatives, transfer};
+use crate::scene::{Caster, Origin, Patch, Surface};
+use arrayvec::ArrayVec;
+use glam::{DMat2, DVec2, DVec3};
+
+/// The longest chain that walks.
+pub const MOST_LINKS: usize = 12;
+/// The most times that a chain is traced in a walk.
+pub const MOST_STEPS: usize = 20;
+/// A chain has arrived when it ends this close to the goal, relative to the longest of its edges.
+const CLOSE: f64 = 1e-11;
+
+/// The near end of a chain, which stays.
+#[derive(Clone, Copy, Debug)]
+pub enum Start<'a> {
+    /// A point in space, as on a lens.
+    Point(DVec3),
+    /// A point on a surface.
+    Surface(&'a Surface),
+}
+
+impl Start<'_> {
+    /// Where it is.
+    pub fn position(&self) -> DVec3 {
+        match self {
+            Self::Point(point) => *point,
+            Self::Surface(surface) => surface.position,
+        }
+    }
+
+    fn leave(&self, direction: DVec3) -> Origin {
+        match self {
+            Self::Point(point) => Origin::from(*point),
+            Self::Surface(surface) => surface.leave(direction),
+        }
+    }
+}
+
+/// The far end of a chain: a point, and a plane through it along which the chain may miss it.
+#[derive(Clone, Copy, Debug)]
+pub struct Goal(Patch);
+
+impl Goal {
+    /// A point and two unit vectors at right angles that span the plane.
+    pub fn new(position: DVec3, tangents: [DVec3; 2]) -> Self {
+        let normal = tangents[0].cross(tangents[1]);
+        Self(Patch { position, tangents, normal, turning: [DVec3::ZERO; 2] })
+    }
+
+    /// Where it is.
+    pub const fn position(&self) -> DVec3 {
+        self.0.position
+    }
+
+    /// Where the ray from `position` along `direction` misses it, in coordinates of the plane; `None` if it never gets
+    /// there.
+    fn miss(&self, position: DVec3, direction: DVec3) -> Option<DVec2> {
+        let Patch { position: goal, tangents: [s, t], normal, .. } = self.0;
+        let distance = normal.dot(goal - position) / normal.dot(direction);
+        let miss = position + direction * distance - goal;
+        (distance > 0.0 && distance.is_finite()).then(|| DVec2::new(s.dot(miss), t.dot(miss)))
+    }
+}
+
+/// Why a walk does not arrive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rejection {
+    /// The chain is too long.
+    TooLong,
+    /// The chain as it is does not lead towards the goal, or not by laws that this knows.
+    Unsuitable,
+    /// A vertex has no place to go: light grazes, or media are equal.
+    Singular,
+    /// It does not come closer, or not soon enough.
+    Lost,
+}
+
+/// The specular vertices of a chain, and what each does.
+#[derive(Clone, Debug)]
+pub struct Chain(ArrayVec<(Surface, Turn), MOST_LINKS>);
+
+/// A chain with the unit vector in which light leaves its last vertex.
+struct Traced {
+    chain: Chain,
+    onward: DVec3,
+}
+
+impl Chain {
+    /// The vertices `surfaces` between `start` and `end`.
+    ///
+    /// # Errors
+    /// [`Rejection::TooLong`], [`Rejection::Unsuitable`].
+    pub fn new(scene: &Caster<'_>, start: DVec3, surfaces: &[Surface], end: DVec3) -> Result<Self, Rejection> {
+        let mut links = ArrayVec::new();
+        if surfaces.len() > MOST_LINKS {
+            return Err(Rejection::TooLong);
+        }
+        for (i, surface) in surfaces.iter().enumerate() {
+            let before = if i == 0 { start } else { surfaces[i - 1].position };
+            let after = surfaces.get(i + 1).map_or(end, |next| next.position);
+            let [from, onward] = [before, after].map(|end| (end - surface.position).normalize());
+            links.push((*surface, Turn::at(scene, surface, from, onward).ok_or(Rejection::Unsuitable)?));
+        }
+        Ok(Self(links))
+    }
+
+    /// Its vertices.
+    pub fn surfaces(&self) -> impl ExactSizeIterator<Item = &Surface> {
+        self.0.iter().map(|(surface, _)| surface)
+    }
+
+    /// How its first vertex moves with the goal: see [`transfer`].
+    ///
+    /// # Errors
+    /// [`Rejection::Unsuitable`] where normals have no known derivatives, [`Rejection::Singular`].
+    pub fn transfer(&self, scene: &Caster<'_>, start: Start<'_>, goal: &Goal) -> Result<DMat2, Rejection> {
+        let patches: ArrayVec<Patch, MOST_LINKS> = self.surfaces().map_while(|surface| scene.patch(surface)).collect();
+        if patches.len() < self.0.len() {
+            return Err(Rejection::Unsuitable);
+        }
+        // It does not move, so its tangents are of no account.
+        let tangents = goal.0.tangents;
+        let fixed = Patch { position: start.position(), tangents, normal: DVec3::ZERO, turning: [DVec3::ZERO; 2] };
+        let links = patches.iter().zip(&self.0).enumerate().map(|(i, (here, (_, turn)))| {
+            let before = if i == 0 { &fixed } else { &patches[i - 1] };
+            derivatives(before, (here, *turn), patches.get(i + 1).unwrap_or(&goal.0))
+        });
+        transfer(links).ok_or(Rejection::Singular)
+    }
+
+    /// The same chain when it sets out towards `first`; `None` where it meets something else on its way.
+    fn trace(&self, scene: &Caster<'_>, start: Start<'_>, first: DVec3) -> Option<Traced> {
+        let mut links = ArrayVec::new();
+        let mut direction = (first - start.position()).try_normalize()?;
+        let mut origin = start.leave(direction);
+        for (old, turn) in &self.0 {
+            let surface = scene.intersect(origin, direction)?;
+            let onward = turn.onward(&surface, -direction)?;
+            // By its law it must also stay on the sides of the true surface that it was on.
+            let found = Turn::at(scene, &surface, -direction, onward);
+            let passes = direction.dot(surface.geometric) * onward.dot(surface.geometric) > 0.0;
+            if surface.bsdf != old.bsdf || found != Some(*turn) || passes != (*turn != Turn::Reflected) {
+                return None;
+            }
+            links.push((surface, *turn));
+            origin = surface.leave(onward);
+            direction = onward;
+        }
+        Some(Traced { chain: Self(links), onward: direction })
+    }
+
+    /// The chain from `start` to `goal` that is near this one, and how often it was traced. Whether its last edge is free
+    /// is left to the caller.
+    ///
+    /// Each step moves the first vertex as the derivatives say, and half as far as before where that does not lead closer.
+    /// It has arrived when it misses the goal by less than 1e-11 of its longest edge.
+    ///
+    /// # Errors
+    /// What [`Rejection`] lists.
+    pub fn walk(&self, scene: &Caster<'_>, start: Start<'_>, goal: &Goal) -> Result<(Self, usize), Rejection> {
+        let Some((first, _)) = self.0.first() else { return Err(Rejection::Unsuitable) };
+        let mut now = self.trace(scene, start, first.position).ok_or(Rejection::Unsuitable)?;
+        let mut miss = now.miss(goal).ok_or(Rejection::Unsuitable)?;
+        let mut share = 1.0;
+        let mut steps = 1;
+        let mut planned = None;
+        while miss.length() > CLOSE * now.chain.longest(start, goal) {
+            if steps == MOST_STEPS {
+                return Err(Rejection::Lost);
+            }
+            let step = match planned {
+                Some(step) => step,
+                None => *planned.insert(now.chain.transfer(scene, start, goal)? * -miss),
+            };
+            let first = &now.chain.0[0].0;
+            let [s, t] = scene.patch(first).ok_or(Rejection::Unsuitable)?.tangents;
+            let towards = first.position + (s * step.x + t * step.y) * share;
+            let next = now.chain.trace(scene, start, towards);
+            steps += 1;
+            match next.and_then(|next| next.miss(goal).map(|miss| (next, miss))) {
+                Some((next, less)) if less.length() < miss.length() => {
+                    (now, miss, planned) = (next, less, None);
+                    share = f64::min(1.0, 2.0 * share);
+                }
+                _ => share *= 0.5,
+            }
+        }
+        Ok((now.chain, steps))
+    }
+
+    fn longest(&self, start: Start<'_>, goal: &Goal) -> f64 {
+        let mut from = start.position();
+        let ends = self.surfaces().map(|surface| surface.position).chain([goal.0.position]);
+        ends.map(|to| to.distance(std::mem::replace(&mut from, to))).fold(0.0, f64::max)
+    }
+}
+
+impl Traced {
+    fn miss(&self, goal: &Goal) -> Option<DVec2> {
+        goal.miss(self.chain.0.last()?.0.position, self.onward)
+    }
+}
