@@ -10,7 +10,7 @@ use glam::DVec3;
 use pathblend::bsdf::{Blend, Bsdf, Conductor, Distribution, RoughConductor, Roughness};
 use pathblend::geometry::Solid;
 use pathblend::image::{Image, Layer};
-use pathblend::integrators::{Budget, Method, Settings};
+use pathblend::integrators::{Budget, Method, Settings, render};
 use pathblend::markov::{FilmSteps, Jumps, LargeSteps, Mutations, SmallStep};
 use pathblend::scene::{Builder, Scene};
 use pathblend::spectrum::Spectrum;
@@ -159,4 +159,44 @@ fn keep(scene: &Scene, cases: Vec<(&'static str, Method, Mutations)>, passes: u6
         }
     }
     assert!(failures.is_empty(), "{failures:#?}");
+}
+
+/// What chains are scaled by, b of each length, is the light of paths of that length, and as uncertain as is said.
+#[test]
+fn normalisations_are_the_light_of_their_length() {
+    let scene = scene();
+    let truth = images(&scene, Method::Bdpt, 150);
+    let light_of = |edges: usize| {
+        let layer = |image: &Image| {
+            // `path_LDE`: two edges.
+            let of_length =
+                image.layers.iter().filter(|(name, _)| name.starts_with("path_") && name.len() == edges + 6);
+            let sum = |layer: &Layer| match layer {
+                Layer::Luminance(layer) => layer.iter().map(|v| f64::from(*v)).sum::<f64>(),
+                _ => 0.0,
+            };
+            of_length.map(|(_, layer)| sum(layer)).sum::<f64>() / (SIZE * SIZE) as f64
+        };
+        estimate(&truth, layer)
+    };
+    for method in [Method::Mmlt, Method::Rjmlt] {
+        let reports: Vec<_> = (0..64)
+            .map(|seed| {
+                let settings =
+                    Settings { seed, max_depth: scene.max_depth, budget: Budget::Passes(8), ..Settings::default() };
+                render(&scene, method, &settings, |_| {}).counts.chains
+            })
+            .collect();
+        assert!(reports[0].len() >= 3, "{:?}", reports[0]);
+        for (index, first) in reports[0].iter().enumerate() {
+            let means: Vec<f64> = reports.iter().map(|reports| reports[index].mean).collect();
+            let (found, expected) = (Estimate::of(&means), light_of(first.length));
+            let z = found.deviation(expected);
+            let claimed = reports.iter().map(|reports| reports[index].standard_error.powi(2)).sum::<f64>() / 64.0;
+            let spread = found.error * 8.0 / claimed.sqrt();
+            println!("| {} | {} | {:.5} | {z:.1} | {spread:.2} |", method.name(), first.length, found.mean);
+            assert!(z < SIGMAS, "length {}: {found:?}, expected {expected:?}", first.length);
+            assert!((0.5..2.0).contains(&spread), "length {}: spread over claim {spread}", first.length);
+        }
+    }
 }
