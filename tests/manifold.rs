@@ -282,6 +282,40 @@ fn flat_surfaces_have_the_textbook_solution() {
     assert!((walk(glass(1.33), DVec3::new(0.1, 0.3, 0.0), below) - bent).length() < 1e-9);
 }
 
+/// Seen in a flat mirror a light is as far away as its image; seen through water, light of all azimuths tells how narrow the
+/// cone is that reaches a ring of the floor.
+#[test]
+fn geometric_terms_have_the_textbook_values() {
+    let (above, below) = (1.0, 0.6);
+    let plane = [DVec3::X, DVec3::Y];
+    let term = |bsdf: Bsdf, at: DVec3, start: DVec3, end: DVec3| {
+        let scene = solid(bsdf, Solid::disk(DVec3::ZERO, DVec3::Z, 9.0));
+        let scene = Caster::new(&scene);
+        let surface = scene.intersect(Origin::from(at + DVec3::Z), -DVec3::Z).unwrap();
+        let chain = Chain::new(&scene, start, &[surface], end).unwrap();
+        chain.geometric_term(&scene, Start::Point(start), &Goal::new(end, plane)).unwrap()
+    };
+    let start = DVec3::new(0.2, 0.1, above);
+    for sine in [0.05f64, 0.3, 0.7, 0.95] {
+        let cos = (1.0 - sine * sine).sqrt();
+        let out = DVec3::new(0.6, 0.8, 0.0);
+        let at = start + out * (above * sine / cos) - DVec3::Z * above;
+        let image = at + out * (below * sine / cos) - DVec3::Z * below;
+        let mirrored = cos / start.distance_squared(image);
+        let found = term(mirror(), at, start, image * DVec3::new(1.0, 1.0, -1.0));
+        assert!((found / mirrored - 1.0).abs() < 1e-9, "{found}, expected {mirrored}");
+        let eta = 1.33;
+        let cos_below = (1.0 - (sine / eta).powi(2)).sqrt();
+        let tangents = [sine / cos, sine / eta / cos_below];
+        let end = at + out * (below * tangents[1]) - DVec3::Z * below;
+        let radius = above * tangents[0] + below * tangents[1];
+        let widening = above / (cos * cos) + below * cos / (eta * cos_below.powi(3));
+        let refracted = sine / (radius * widening);
+        let found = term(glass(eta), at, start, end);
+        assert!((found / refracted - 1.0).abs() < 1e-9, "{found}, expected {refracted}");
+    }
+}
+
 #[test]
 fn what_cannot_walk_is_rejected() {
     let ball = Solid::sphere(DVec3::ZERO, 0.7);

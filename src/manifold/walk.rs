@@ -130,6 +130,25 @@ impl Chain {
         transfer(links).ok_or(Rejection::Singular)
     }
 
+    /// The generalised geometric term of the chain: how much projected solid angle at the near end an area of the goal's
+    /// plane fills, seen along the chain, in 1 / squared scene unit. Two points that see each other have cos θ_0 cos θ_1 / d²;
+    /// a point in space has no cosine (Jakob and Marschner 2012, section 4.3).
+    ///
+    /// # Errors
+    /// As [`Chain::transfer`].
+    pub fn geometric_term(&self, scene: &Caster<'_>, start: Start<'_>, goal: &Goal) -> Result<f64, Rejection> {
+        let (first, _) = self.0.first().ok_or(Rejection::Unsuitable)?;
+        let edge = first.position - start.position();
+        let (direction, squared) = (edge.normalize(), edge.length_squared());
+        let leaving = match start {
+            Start::Point(_) => 1.0,
+            Start::Surface(surface) => surface.geometric.dot(direction).abs(),
+        };
+        let arriving = first.geometric.dot(direction).abs();
+        let transfer = self.transfer(scene, start, goal)?;
+        Ok(leaving * arriving / squared * transfer.determinant().abs())
+    }
+
     /// The same chain when it sets out towards `first`; `None` where it meets something else on its way.
     fn trace(&self, scene: &Caster<'_>, start: Start<'_>, first: DVec3) -> Option<Traced> {
         let mut links = ArrayVec::new();
