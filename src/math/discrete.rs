@@ -37,11 +37,13 @@ impl Discrete {
     /// Index chosen by `u` in [0, 1), with what is left of `u` after the choice, again uniform in [0, 1).
     #[inline]
     pub fn sample(&self, u: f64) -> (usize, f64) {
-        if self.len() == 1 {
-            return (0, u);
-        }
-        let last = self.len() - 1;
-        let mut index = self.cumulative.partition_point(|c| *c <= u).saturating_sub(1).min(last);
+        // Where one outcome ends and the next begins; for a few of them counting is faster than bisection.
+        let bounds = &self.cumulative[1..self.len()];
+        let mut index = match bounds.len() {
+            0 => return (0, u),
+            1..=8 => bounds.iter().map(|bound| usize::from(*bound <= u)).sum(),
+            _ => bounds.partition_point(|bound| *bound <= u),
+        };
         while index > 0 && self.pdf(index) == 0.0 {
             index -= 1; // u beyond the last outcome that can occur, by rounding
         }

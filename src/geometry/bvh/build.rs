@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use super::collapse::{Primitives, collapse};
 use super::frame::Frame;
 use super::groups::Groups;
+use super::packet::Packet;
 use super::pages::Pages;
 use super::traverse::FLAT_PACKETS;
 use super::{Bvh, Dropped};
@@ -48,8 +49,9 @@ pub fn build(vertices: &[Vec3], triangles: &[[u32; 3]], solids: &[Solid]) -> Bvh
     let primitives = Primitives { frame, vertices, indices: triangles, triangles: &kept, solids: &kept_solids };
     if kept.len() <= 8 * FLAT_PACKETS && kept_solids.len() <= LOOSE_SOLIDS {
         let numbers: Vec<u32> = (0..kept.len() as u32).collect();
-        let packets = Pages::new(numbers.chunks(8).map(|numbers| primitives.packet(numbers)).collect());
-        let (nodes, solids) = (Pages::new(Vec::new()), solids.to_vec());
+        let mut packets: Vec<_> = numbers.chunks(8).map(|numbers| primitives.packet(numbers)).collect();
+        Packet::level(&mut packets);
+        let (nodes, packets, solids) = (Pages::new(Vec::new()), Pages::new(packets), solids.to_vec());
         return Bvh { frame, bounds, dropped, nodes, packets, solids, loose: kept_solids };
     }
     let count = kept.len();

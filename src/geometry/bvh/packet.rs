@@ -19,9 +19,9 @@ pub struct Packet {
     vertices: [[f32x8; 3]; 3],
     /// The caller's index of each triangle.
     pub ids: [u32; 8],
-    /// Largest absolute coordinate.
+    /// Not below the largest absolute coordinate.
     magnitude: f32,
-    /// Longest edge.
+    /// Not below the longest edge.
     edge: f32,
     /// To the next multiple of the alignment.
     rest: [u32; 6],
@@ -33,6 +33,17 @@ pub struct Refined {
     pub t: f64,
     pub u: f64,
     pub v: f64,
+}
+
+/// Bounds on the rounding errors of a packet's filter for one ray.
+#[derive(Clone, Copy, Debug)]
+pub struct Tolerance {
+    /// Of edge functions.
+    edge: f32,
+    /// Of distances times determinants, where that does not grow with the determinant.
+    volume: f32,
+    /// Of distances.
+    distance: f32,
 }
 
 impl Packet {
@@ -53,19 +64,32 @@ impl Packet {
         Self { vertices: lanes.map(|v| v.map(f32x8::new)), ids, magnitude, edge, rest: [0; 6] }
     }
 
-    /// The lanes (bit mask) that may be hit at a distance of at most `limit` from the query's `f32` origin: all that
-    /// [`Packet::refine`] accepts, and few others.
+    /// Makes packets take the tolerance of the largest among them, so that it is found once for all.
+    pub fn level(packets: &mut [Self]) {
+        let most = |of: fn(&Self) -> f32| packets.iter().map(of).fold(0.0, f32::max);
+        let (magnitude, edge) = (most(|packet| packet.magnitude), most(|packet| packet.edge));
+        packets.iter_mut().for_each(|packet| (packet.magnitude, packet.edge) = (magnitude, edge));
+    }
+
+    /// What rounding can do to a ray's [`Packet::filter`].
     ///
     /// With u = 2^-24 and m the largest coordinate of packet and origin together, a sheared x or y is off by at most
     /// 6 m u < δ = 8 m u. If the ray meets the triangle, then its sheared vertices are no farther from the ray than
     /// √2 L (L the longest edge), and an edge function is off by less than 12 δ (L + δ) = e. In the distance times
     /// determinant, weights off by e act on the spread of z, below √3 L, and all else is relative to the determinant.
     #[inline(always)]
-    pub fn filter(&self, query: &Query, limit: f32) -> u32 {
+    pub fn tolerance(&self, query: &Query) -> Tolerance {
         const ROUNDOFF: f32 = 8.0 / (1u32 << 24) as f32;
         let delta = ROUNDOFF * (self.magnitude + query.magnitude);
-        let edge_error = 12.0 * delta * (self.edge + delta);
-        let volume_error = f32x8::splat(edge_error * (6.0 * self.edge + 16.0 * delta));
+        let edge = 12.0 * delta * (self.edge + delta);
+        Tolerance { edge, volume: edge * (6.0 * self.edge + 16.0 * delta), distance: 4.0 * delta }
+    }
+
+    /// The lanes (bit mask) that may be hit at a distance of at most `limit` from the query's `f32` origin: all that
+    /// [`Packet::refine`] accepts, and few others. `off` is the packet's [`Packet::tolerance`].
+    #[inline(always)]
+    pub fn filter(&self, query: &Query, off: &Tolerance, limit: f32) -> u32 {
+        let volume_error = f32x8::splat(off.volume);
         let [sx, sy, sz] = query.shear32;
         let [sx, sy, sz] = [f32x8::splat(sx), f32x8::splat(sy), f32x8::splat(sz)];
         let [ox, oy, oz] = query.origin32;
@@ -80,14 +104,14 @@ impl Packet {
         let u = cx.mul_sub(by, cy * bx);
         let v = ax.mul_sub(cy, ay * cx);
         let w = bx.mul_sub(ay, by * ax);
-        let tolerance = f32x8::splat(edge_error);
+        let tolerance = f32x8::splat(off.edge);
         let one_side = u.fast_min(v).fast_min(w).simd_ge(-tolerance) | u.fast_max(v).fast_max(w).simd_le(tolerance);
         let determinant = u + v + w;
         let sign = determinant & f32x8::splat(-0.0);
         let size = determinant ^ sign;
         let volume = u.mul_add(az, v.mul_add(bz, w * cz)) ^ sign;
-        let latest = size.mul_add(f32x8::splat(limit + 4.0 * delta), volume_error);
-        let earliest = size.mul_add(f32x8::splat(4.0 * delta), volume_error);
+        let latest = size.mul_add(f32x8::splat(limit + off.distance), volume_error);
+        let earliest = size.mul_add(f32x8::splat(off.distance), volume_error);
         (one_side & volume.simd_le(latest) & (-volume).simd_le(earliest)).to_bitmask()
     }
 

@@ -65,8 +65,10 @@ impl Bvh {
         let packets = &*self.packets;
         let mut best = Best::new(query);
         let mut candidates = 0u64;
-        for (index, packet) in packets.iter().enumerate().take(FLAT_PACKETS) {
-            candidates |= u64::from(packet.filter(query, best.t32)) << (8 * index);
+        if let Some(off) = packets.first().map(|packet| packet.tolerance(query)) {
+            for (index, packet) in packets.iter().enumerate().take(FLAT_PACKETS) {
+                candidates |= u64::from(packet.filter(query, &off, best.t32)) << (8 * index);
+            }
         }
         while candidates != 0 && !(ANY && best.primitive.is_some()) {
             let bit = candidates.trailing_zeros() as usize;
@@ -137,7 +139,7 @@ impl Bvh {
 
 #[inline(always)]
 fn visit_packet<const ANY: bool>(packet: &Packet, query: &Query, best: &mut Best) {
-    let mut mask = packet.filter(query, best.t32);
+    let mut mask = packet.filter(query, &packet.tolerance(query), best.t32);
     while mask != 0 && !(ANY && best.primitive.is_some()) {
         let lane = mask.trailing_zeros() as usize;
         mask &= mask - 1;
