@@ -14,7 +14,7 @@ use super::groups::Groups;
 use super::packet::Packet;
 use super::pages::Pages;
 use super::traverse::FLAT_PACKETS;
-use super::{Bvh, Dropped};
+use super::{Bvh, Dropped, Form};
 use crate::geometry::offset::cross;
 use crate::geometry::{Bounds, Solid};
 
@@ -51,8 +51,8 @@ pub fn build(vertices: &[Vec3], triangles: &[[u32; 3]], solids: &[Solid]) -> Bvh
         let numbers: Vec<u32> = (0..kept.len() as u32).collect();
         let mut packets: Vec<_> = numbers.chunks(8).map(|numbers| primitives.packet(numbers)).collect();
         Packet::level(&mut packets);
-        let (nodes, packets, solids) = (Pages::new(Vec::new()), Pages::new(packets), solids.to_vec());
-        return Bvh { frame, bounds, dropped, nodes, packets, solids, loose: kept_solids };
+        let form = Form::Flat { packets, solids: kept_solids };
+        return Bvh { frame, bounds, dropped, form, solids: solids.to_vec() };
     }
     let count = kept.len();
     let bounding = |i: usize| match i.checked_sub(count) {
@@ -69,8 +69,8 @@ pub fn build(vertices: &[Vec3], triangles: &[[u32; 3]], solids: &[Solid]) -> Bvh
     drop(boxes);
     let wide = collapse(&tree, &groups, &primitives, bounding);
     drop((tree, groups));
-    let (nodes, packets) = (Pages::new(wide.nodes), Pages::new(wide.packets));
-    Bvh { frame, bounds, dropped, nodes, packets, solids: solids.to_vec(), loose: Vec::new() }
+    let form = Form::Tree { nodes: Pages::new(wide.nodes), packets: Pages::new(wide.packets) };
+    Bvh { frame, bounds, dropped, form, solids: solids.to_vec() }
 }
 
 /// Whether a triangle can be hit; if not, it is counted.

@@ -39,17 +39,23 @@ pub struct Dropped {
     pub degenerate: usize,
 }
 
+/// How the primitives are kept.
+#[derive(Debug)]
+enum Form {
+    /// All are tested: at most [`traverse::FLAT_PACKETS`] packets, [levelled](Packet::level), and solids by their indices.
+    Flat { packets: Vec<Packet>, solids: Vec<u32> },
+    /// The first node is the root.
+    Tree { nodes: Pages<Node>, packets: Pages<Packet> },
+}
+
 /// The hierarchy; holds its own copy of the geometry. Immutable and shared between threads.
 #[derive(Debug)]
 pub struct Bvh {
     frame: Frame,
     bounds: Bounds,
     dropped: Dropped,
-    nodes: Pages<Node>,
-    packets: Pages<Packet>,
+    form: Form,
     solids: Vec<Solid>,
-    /// Indices of the solids that a hierarchy without nodes tests one by one.
-    loose: Vec<u32>,
 }
 
 impl Bvh {

@@ -3,10 +3,10 @@
 use arrayvec::ArrayVec;
 use wide::f32x8;
 
-use super::Bvh;
 use super::packet::Packet;
 use super::query::Query;
-use super::wide::{Child, ChildKind};
+use super::wide::{Child, ChildKind, Node};
+use super::{Bvh, Form};
 use crate::geometry::{Primitive, Ray};
 
 /// Levels of wide nodes that [`super::collapse`] never exceeds.
@@ -55,14 +55,16 @@ impl Bvh {
     #[inline(always)]
     pub(super) fn dispatch<const ANY: bool>(&self, ray: &Ray, leaving: u32) -> Option<Best> {
         let query = Query::new(ray, leaving, &self.frame)?;
-        Some(if self.nodes.is_empty() { self.flat::<ANY>(&query, ray) } else { self.traverse::<ANY>(&query, ray) })
+        Some(match &self.form {
+            Form::Flat { packets, solids } => self.flat::<ANY>(packets, solids, &query, ray),
+            Form::Tree { nodes, packets } => self.traverse::<ANY>(nodes, packets, &query, ray),
+        })
     }
 
     /// Without nodes: all packets are filtered, then all candidates refined. No branch until then depends on the ray,
     /// which for a few packets is faster than any hierarchy.
     #[inline(always)]
-    fn flat<const ANY: bool>(&self, query: &Query, ray: &Ray) -> Best {
-        let packets = &*self.packets;
+    fn flat<const ANY: bool>(&self, packets: &[Packet], solids: &[u32], query: &Query, ray: &Ray) -> Best {
         let mut best = Best::new(query);
         let mut candidates = 0u64;
         if let Some(off) = packets.first().map(|packet| packet.tolerance(query)) {
@@ -75,7 +77,7 @@ impl Bvh {
             candidates &= candidates - 1;
             refine(&packets[bit / 8], bit % 8, query, &mut best);
         }
-        for solid in &self.loose {
+        for solid in solids {
             if ANY && best.primitive.is_some() {
                 break;
             }
@@ -85,8 +87,7 @@ impl Bvh {
     }
 
     #[inline(always)]
-    fn traverse<const ANY: bool>(&self, query: &Query, ray: &Ray) -> Best {
-        let (nodes, packets) = (&*self.nodes, &*self.packets);
+    fn traverse<const ANY: bool>(&self, nodes: &[Node], packets: &[Packet], query: &Query, ray: &Ray) -> Best {
         let mut best = Best::new(query);
         let mut stack = ArrayVec::<u64, STACK>::new_const();
         let mut child = Child::node(0);
