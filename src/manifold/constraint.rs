@@ -26,24 +26,24 @@ const LEAST: f64 = 1e-9;
 
 /// How far the half-vector between `before` and `after` is off the normal, a vector at right angles to it.
 pub fn offset(before: DVec3, (here, turn): (&Patch, Turn), after: DVec3) -> Option<DVec3> {
-    let half = half((before - here.position).normalize(), turn, (after - here.position).normalize())?;
+    let (half, _) = half((before - here.position).normalize(), turn, (after - here.position).normalize())?;
     let along = half.dot(here.normal);
     Some((half - here.normal * along) * 1f64.copysign(along))
 }
 
-fn half(back: DVec3, turn: Turn, onward: DVec3) -> Option<DVec3> {
+/// The half-vector's direction and its length.
+fn half(back: DVec3, turn: Turn, onward: DVec3) -> Option<(DVec3, f64)> {
     let half = back + onward * turn.weight();
     let length = half.length();
     // NaN is none either.
-    (length > LEAST).then(|| half / length)
+    (length > LEAST).then(|| (half / length, length))
 }
 
 /// The derivatives of [`offset`] in the frame around the normal; `None` where the half-vector has no direction.
 pub fn derivatives(before: &Patch, (here, turn): (&Patch, Turn), after: &Patch) -> Option<Derivatives> {
     let (to_before, to_after) = (before.position - here.position, after.position - here.position);
     let (back, onward) = (to_before.normalize(), to_after.normalize());
-    let length = (back + onward * turn.weight()).length();
-    let half = half(back, turn, onward)?;
+    let (half, length) = half(back, turn, onward)?;
     let along = half.dot(here.normal);
     let Frame { tangent, bitangent, .. } = Frame::around(here.normal);
     let project = |v: DVec3| DVec2::new(tangent.dot(v), bitangent.dot(v));

@@ -15,6 +15,7 @@ mod walk;
 pub use constraint::{Derivatives, derivatives, offset, transfer};
 pub use walk::{Chain, Goal, MOST_LINKS, MOST_STEPS, Rejection, Start};
 
+use crate::bsdf::fresnel;
 use crate::scene::{Scene, Surface};
 use glam::DVec3;
 
@@ -57,9 +58,8 @@ impl Turn {
         match self {
             Self::Reflected => Some(normal * (2.0 * cos) - from),
             Self::Refracted { eta } => {
-                let cos_squared = 1.0 - (1.0 - cos * cos) / (eta * eta);
-                let onward = (normal * cos - from) / eta - normal * cos_squared.max(0.0).sqrt().copysign(cos);
-                (cos_squared > 0.0).then_some(onward)
+                let (_, cos_beyond) = fresnel::dielectric(cos.abs(), eta);
+                Some((normal * cos - from) / eta - normal * cos_beyond?.copysign(cos))
             }
         }
     }

@@ -111,23 +111,28 @@ impl Chain {
         self.0.iter().map(|(surface, _)| surface)
     }
 
-    /// How its first vertex moves with the goal: see [`transfer`].
+    /// How its first vertex moves with the goal, in the tangents of [`Scene::patch`](crate::scene::Scene::patch) and of the
+    /// goal: see [`transfer`].
     ///
     /// # Errors
     /// [`Rejection::Unsuitable`] where normals have no known derivatives, [`Rejection::Singular`].
     pub fn transfer(&self, scene: &Caster<'_>, start: Start<'_>, goal: &Goal) -> Result<DMat2, Rejection> {
+        self.follow(scene, start, goal).map(|(transfer, _)| transfer)
+    }
+
+    /// [`Chain::transfer`], and the first vertex's tangents.
+    fn follow(&self, scene: &Caster<'_>, start: Start<'_>, goal: &Goal) -> Result<(DMat2, [DVec3; 2]), Rejection> {
         let patches: ArrayVec<Patch, MOST_LINKS> = self.surfaces().map_while(|surface| scene.patch(surface)).collect();
         if patches.len() < self.0.len() {
             return Err(Rejection::Unsuitable);
         }
-        // It does not move, so its tangents are of no account.
-        let tangents = goal.0.tangents;
-        let fixed = Patch { position: start.position(), tangents, normal: DVec3::ZERO, turning: [DVec3::ZERO; 2] };
+        // It does not move, so only its place is of account.
+        let fixed = Patch { position: start.position(), ..goal.0 };
         let links = patches.iter().zip(&self.0).enumerate().map(|(i, (here, (_, turn)))| {
             let before = if i == 0 { &fixed } else { &patches[i - 1] };
             derivatives(before, (here, *turn), patches.get(i + 1).unwrap_or(&goal.0))
         });
-        transfer(links).ok_or(Rejection::Singular)
+        Ok((transfer(links).ok_or(Rejection::Singular)?, patches.first().unwrap_or(&goal.0).tangents))
     }
 
     /// The generalised geometric term of the chain: how much projected solid angle at the near end an area of the goal's
@@ -191,12 +196,13 @@ impl Chain {
             }
             let step = match planned {
                 Some(step) => step,
-                None => *planned.insert(now.chain.transfer(scene, start, goal)? * -miss),
+                None => {
+                    let (transfer, [s, t]) = now.chain.follow(scene, start, goal)?;
+                    let DVec2 { x, y } = transfer * -miss;
+                    *planned.insert(s * x + t * y)
+                }
             };
-            let first = &now.chain.0[0].0;
-            let [s, t] = scene.patch(first).ok_or(Rejection::Unsuitable)?.tangents;
-            let towards = first.position + (s * step.x + t * step.y) * share;
-            let next = now.chain.trace(scene, start, towards);
+            let next = now.chain.trace(scene, start, now.chain.0[0].0.position + step * share);
             steps += 1;
             match next.and_then(|next| next.miss(goal).map(|miss| (next, miss))) {
                 Some((next, less)) if less.length() < miss.length() => {
