@@ -1,7 +1,10 @@
 //! Photons by place: what lies within a radius of a point.
 
+use foldhash::fast::FixedState;
 use glam::{DVec3, IVec3};
 use rayon::prelude::*;
+use std::collections::HashMap;
+use std::ops::Range;
 
 /// Something with a place.
 pub(super) trait Located: Copy + Send + Sync {
@@ -11,46 +14,93 @@ pub(super) trait Located: Copy + Send + Sync {
 
 /// Photons, and grids whose cells double in size from one to the next. Radii grow with the distance from the camera; each
 /// is served by the grid whose cells are just as wide as its disk, so that no gather looks at more than eight of them.
+///
+/// The photons lie along Morton's curve through the smallest cells. It goes through every larger cell from end to end
+/// before it goes on, so that what lies in a cell of any of the grids is one run of photons.
 pub(super) struct Grids<T> {
-    /// Along a curve that keeps neighbours close.
     photons: Vec<T>,
-    smallest: f64,
-    /// By level; `None` where no radius has that size.
-    levels: Vec<Option<Grid>>,
+    /// Width of the smallest cells.
+    width: f64,
+    /// By level; empty where no radius has that size.
+    levels: Vec<Runs>,
 }
 
-impl<T: Located> Grids<T> {
-    /// Most levels; smaller radii are served by cells that are larger than need be.
-    const LEVELS: i32 = 24;
+/// The photons of each cell, by its place along the curve.
+type Runs = HashMap<u64, Range<u32>, FixedState>;
 
-    /// Grids of `photons` for searches within `radii`.
-    pub(super) fn new(mut photons: Vec<T>, radii: impl Iterator<Item = f64> + Clone) -> Self {
-        let largest = radii.clone().fold(0.0, f64::max);
-        let smallest = radii.clone().fold(f64::INFINITY, f64::min).max(largest * 0.5f64.powi(Self::LEVELS - 1));
-        photons.par_sort_by_cached_key(|photon| along_curve((photon.position() / smallest).floor().as_ivec3()));
-        let mut grids = Self { photons, smallest, levels: Vec::new() };
-        for radius in radii {
-            let level = grids.level(radius);
-            grids.levels.resize_with(grids.levels.len().max(level + 1), || None);
-            let cell = 2.0 * smallest * 2f64.powi(level as i32);
-            grids.levels[level].get_or_insert_with(|| Grid::new(&grids.photons, cell));
-        }
+impl<T: Located> Grids<T> {
+    /// Most levels, so that neighbouring cells never share their place; smaller radii are served by cells that are larger
+    /// than need be.
+    const LEVELS: u32 = 20;
+
+    /// Grids for searches within `radii`, of the photons of some jobs.
+    pub(super) fn new(jobs: &[Vec<T>], radii: impl ParallelIterator<Item = f64> + Clone) -> Self {
+        let largest = radii.clone().reduce(|| 0.0, f64::max);
+        let smallest = radii.clone().reduce(|| f64::INFINITY, f64::min);
+        let width = 2.0 * smallest.max(largest * 0.5f64.powi(Self::LEVELS as i32 - 1));
+        let mut order: Vec<(u64, u32, u32)> = Vec::new();
+        order.par_extend(jobs.par_iter().enumerate().flat_map_iter(|(job, photons)| {
+            let place = move |photon: &T| along_curve(cell_of(photon.position(), width));
+            (0..).zip(photons).map(move |(index, photon)| (place(photon), job as u32, index))
+        }));
+        order.par_sort_unstable();
+        let mut photons = Vec::new();
+        order.par_iter().map(|&(_, job, index)| jobs[job as usize][index as usize]).collect_into_vec(&mut photons);
+        let mut grids = Self { photons, width, levels: Vec::new() };
+        let used = radii.fold(|| 0u32, |used, radius| used | 1 << grids.level(radius)).reduce(|| 0, |a, b| a | b);
+        grids.levels = (0..u32::BITS - used.leading_zeros())
+            .into_par_iter()
+            .map(|level| if used & 1 << level == 0 { Runs::default() } else { runs(&order, level) })
+            .collect();
         grids
     }
 
     /// The first level whose cells are at least as wide as a disk of `radius`.
     #[inline]
-    fn level(&self, radius: f64) -> usize {
-        (radius / self.smallest).log2().ceil().max(0.0) as usize
+    fn level(&self, radius: f64) -> u32 {
+        (2.0 * radius / self.width).log2().ceil().max(0.0) as u32
     }
 
     /// Calls `each` for the photons closer to `center` than `radius`, one of those that the grids were made for.
     #[inline]
-    pub(super) fn within(&self, center: DVec3, radius: f64, each: impl FnMut(&T)) {
-        if let Some(Some(grid)) = self.levels.get(self.level(radius)) {
-            grid.within(&self.photons, center, radius, each);
+    pub(super) fn within(&self, center: DVec3, radius: f64, mut each: impl FnMut(&T)) {
+        let level = self.level(radius);
+        let Some(runs) = self.levels.get(level as usize) else { return };
+        let low = cell_of(center - radius, self.width) >> level;
+        let high = cell_of(center + radius, self.width) >> level;
+        for x in low.x..=high.x {
+            for y in low.y..=high.y {
+                for z in low.z..=high.z {
+                    // Along the curve, a level takes three bits.
+                    let place = along_curve(IVec3::new(x, y, z) << level) >> (3 * level);
+                    let Some(run) = runs.get(&place) else { continue };
+                    for photon in &self.photons[run.start as usize..run.end as usize] {
+                        if photon.position().distance_squared(center) < radius * radius {
+                            each(photon);
+                        }
+                    }
+                }
+            }
         }
     }
+}
+
+/// The cell of a grid with cells of this `width` that holds `position`.
+#[inline]
+fn cell_of(position: DVec3, width: f64) -> IVec3 {
+    (position / width).floor().as_ivec3()
+}
+
+/// Runs of equal cells of one `level` in photons sorted by their places.
+fn runs(order: &[(u64, u32, u32)], level: u32) -> Runs {
+    let mut runs = Runs::default();
+    let mut start = 0;
+    for run in order.chunk_by(|a, b| a.0 >> (3 * level) == b.0 >> (3 * level)) {
+        let end = start + run.len() as u32;
+        runs.insert(run[0].0 >> (3 * level), start..end);
+        start = end;
+    }
+    runs
 }
 
 /// Place of a cell along Morton's curve; cells 2²¹ apart share one.
@@ -71,77 +121,6 @@ fn along_curve(cell: IVec3) -> u64 {
     spread(cell.x) | spread(cell.y) << 1 | spread(cell.z) << 2
 }
 
-/// Numbers of photons, sorted into the cells of a hashed grid.
-struct Grid {
-    /// Width of a cell.
-    cell: f64,
-    /// Where the photons of each bucket start; one more entry than there are buckets.
-    starts: Vec<u32>,
-    numbers: Vec<u32>,
-}
-
-impl Grid {
-    /// A grid with cells of width `cell`.
-    fn new<T: Located>(photons: &[T], cell: f64) -> Self {
-        let buckets = photons.len().next_power_of_two();
-        let mut grid = Self { cell, starts: vec![0; buckets + 1], numbers: vec![0; photons.len()] };
-        let bucket_of: Vec<u32> =
-            photons.par_iter().map(|photon| grid.bucket(grid.cell_of(photon.position())) as u32).collect();
-        // Counted two places further on, so that after the sums a bucket's start stands where its end is to be, and moves
-        // there as its photons come in.
-        for &bucket in &bucket_of {
-            if let Some(count) = grid.starts.get_mut(bucket as usize + 2) {
-                *count += 1;
-            }
-        }
-        for bucket in 1..buckets {
-            grid.starts[bucket + 1] += grid.starts[bucket];
-        }
-        for (number, bucket) in (0u32..).zip(bucket_of) {
-            let end = &mut grid.starts[bucket as usize + 1];
-            grid.numbers[*end as usize] = number;
-            *end += 1;
-        }
-        grid
-    }
-
-    #[inline]
-    fn cell_of(&self, position: DVec3) -> IVec3 {
-        (position / self.cell).floor().as_ivec3()
-    }
-
-    #[inline]
-    fn bucket(&self, cell: IVec3) -> usize {
-        // Teschner et al. 2003, *Optimized Spatial Hashing*.
-        let hash = (cell.x as u32).wrapping_mul(73_856_093)
-            ^ (cell.y as u32).wrapping_mul(19_349_663)
-            ^ (cell.z as u32).wrapping_mul(83_492_791);
-        hash as usize & (self.starts.len() - 2)
-    }
-
-    /// Calls `each` for the photons closer to `center` than `radius`.
-    #[inline]
-    fn within<T: Located>(&self, photons: &[T], center: DVec3, radius: f64, mut each: impl FnMut(&T)) {
-        let (low, high) = (self.cell_of(center - radius), self.cell_of(center + radius));
-        for x in low.x..=high.x {
-            for y in low.y..=high.y {
-                for z in low.z..=high.z {
-                    let cell = IVec3::new(x, y, z);
-                    let bucket = self.bucket(cell);
-                    let range = self.starts[bucket] as usize..self.starts[bucket + 1] as usize;
-                    for number in &self.numbers[range] {
-                        let photon = &photons[*number as usize];
-                        let near = photon.position().distance_squared(center) < radius * radius;
-                        if near && self.cell_of(photon.position()) == cell {
-                            each(photon);
-                        }
-                    }
-                }
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -160,7 +139,7 @@ mod tests {
             |scale: f64| DVec3::new(stream.number(), stream.number(), stream.number()) * scale - 0.5 * scale;
         let photons: Vec<DVec3> = (0..5000).map(|_| point(3.0)).collect();
         let radii = [0.01, 0.1, 0.5, 1.0];
-        let grids = Grids::new(photons.clone(), radii.into_iter());
+        let grids = Grids::new(&[photons[..2000].to_vec(), photons[2000..].to_vec()], radii.into_par_iter());
         for radius in radii {
             for _ in 0..50 {
                 let center = point(3.5);

@@ -93,12 +93,10 @@ impl Sppm {
             }
             (gathers, job.scene.rays())
         });
-        let shot: Vec<(Vec<Photon>, u64)> =
-            (0..JOBS).into_par_iter().map(|job| self.shoot(scene, pass, job as u64)).collect();
-        let rays = walks.iter().map(|w| w.1).sum::<u64>() + shot.iter().map(|s| s.1).sum::<u64>();
-        let mut photons = Vec::with_capacity(shot.iter().map(|s| s.0.len()).sum());
-        photons.extend(shot.into_iter().flat_map(|s| s.0));
-        let grids = Grids::new(photons, walks.iter().flat_map(|w| &w.0).map(|gather| gather.radius));
+        let (photons, photon_rays): (Vec<Vec<Photon>>, Vec<u64>) =
+            (0..JOBS).into_par_iter().map(|job| self.shoot(scene, pass, job as u64)).unzip();
+        let rays = walks.iter().map(|walk| walk.1).chain(photon_rays).sum();
+        let grids = Grids::new(&photons, walks.par_iter().flat_map_iter(|walk| &walk.0).map(|gather| gather.radius));
         film.for_each_band(|index, band| {
             for gather in &walks[index].0 {
                 self.gather(scene, &grids, gather, band);

@@ -87,7 +87,7 @@ impl Vcm {
         let techniques = Techniques { heuristic: Some(self.heuristic), merging };
         let bundles: Vec<Bundle> =
             (0..JOBS).into_par_iter().map(|job| self.shoot(scene, &kernel, size, &techniques, pass, job)).collect();
-        let grids = (self.radius > 0.0).then(|| Grids::new(photons(&bundles), std::iter::once(self.radius)));
+        let grids = (self.radius > 0.0).then(|| Grids::new(&photons(&bundles), rayon::iter::once(self.radius)));
         let rays = film.for_each_band(|index, band| {
             let caster = Caster::choosing(scene, self.lights);
             let mut stream = Stream::new(self.seed, &[0, pass, index as u64]);
@@ -194,10 +194,10 @@ fn path(bundles: &[Bundle], paths: usize, number: usize) -> &[Vertex] {
     bundles[job].path(number - job_range(paths, job).start)
 }
 
-/// The vertices at which light subpaths may be merged.
-fn photons(bundles: &[Bundle]) -> Vec<Photon> {
-    let mut photons = Vec::new();
-    for (job, bundle) in bundles.iter().enumerate() {
+/// The vertices of each bundle at which light subpaths may be merged.
+fn photons(bundles: &[Bundle]) -> Vec<Vec<Photon>> {
+    let of_bundle = |(job, bundle): (usize, &Bundle)| {
+        let mut photons = Vec::new();
         let mut start = 0;
         for &end in &bundle.ends {
             for (index, vertex) in bundle.vertices[..end].iter().enumerate().skip(start + 1) {
@@ -208,8 +208,9 @@ fn photons(bundles: &[Bundle]) -> Vec<Photon> {
             }
             start = end;
         }
-    }
-    photons
+        photons
+    };
+    bundles.par_iter().enumerate().map(of_bundle).collect()
 }
 
 /// Median over the film of the size that a pixel has at the first vertex of its walk that can be merged; 0 where there is
