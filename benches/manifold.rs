@@ -7,8 +7,9 @@ use pathblend::bsdf::{Bsdf, Conductor, Dielectric};
 use pathblend::camera::{Camera, Projection};
 use pathblend::film::Filter;
 use pathblend::geometry::Solid;
-use pathblend::manifold::{Chain, Goal, Start, Turn};
+use pathblend::manifold::{Chain, Goal, Turn};
 use pathblend::math::{Frame, Stream};
+use pathblend::paths::Node;
 use pathblend::scene::{Builder, Caster, FilmSpec, Origin, Scene, Surface};
 use pathblend::spectrum::Spectrum;
 
@@ -64,7 +65,7 @@ fn main() {
         let clock = ThreadTime::now();
         let (mut arrived, mut traces) = (0, 0);
         for (start, chain, goal) in &examples {
-            if let Ok((_, steps)) = chain.walk(&scene, Start::Point(*start), goal) {
+            if let Ok((_, steps)) = chain.walk(&scene, &Node::lens(*start), goal) {
                 arrived += 1;
                 traces += steps;
             }

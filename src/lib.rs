@@ -16,6 +16,7 @@ pub mod load;
 pub mod manifold;
 pub mod markov;
 pub mod math;
+pub mod path_space;
 pub mod paths;
 pub mod report;
 pub mod scene;

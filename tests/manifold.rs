@@ -8,8 +8,9 @@ use common::{build, glass, pinhole};
 use glam::{DMat2, DVec2, DVec3, Vec3};
 use pathblend::bsdf::{Bsdf, Conductor};
 use pathblend::geometry::Solid;
-use pathblend::manifold::{Chain, Goal, MOST_LINKS, Rejection, Start, Turn, derivatives, offset};
+use pathblend::manifold::{Chain, Goal, MOST_LINKS, Rejection, Turn, derivatives, offset};
 use pathblend::math::{Frame, Stream};
+use pathblend::paths::Node;
 use pathblend::scene::{Builder, Caster, Mesh, Origin, Patch, Scene, Surface};
 use pathblend::spectrum::Spectrum;
 
@@ -196,7 +197,7 @@ fn walks_arrive_and_return() {
         let [mut arrived, mut returned, mut steps, mut elsewhere] = [0; 4];
         let examples = examples(&case, &scene, 1000);
         for example in &examples {
-            let start = Start::Point(example.start);
+            let start = &Node::lens(example.start);
             let by = DVec2::new(stream.number() - 0.5, stream.number() - 0.5) * 0.1;
             let chain = example.chain(&scene);
             let Ok((there, count)) = chain.walk(&scene, start, &example.aim(by)) else { continue };
@@ -230,13 +231,13 @@ fn first_vertices_follow_the_goal() {
     const STEP: f64 = 1e-5;
     for case in cases() {
         let scene = Caster::new(&case.scene);
-        let (mut errors, start) = (Vec::new(), |example: &Example| Start::Point(example.start));
+        let (mut errors, start) = (Vec::new(), |example: &Example| Node::lens(example.start));
         for example in examples(&case, &scene, 200) {
             let chain = example.chain(&scene);
-            let Ok(expected) = chain.transfer(&scene, start(&example), &example.aim(DVec2::ZERO)) else { continue };
+            let Ok(expected) = chain.transfer(&scene, &start(&example), &example.aim(DVec2::ZERO)) else { continue };
             let [s, t] = scene.patch(&example.surfaces[0]).unwrap().tangents;
             let first = |by: DVec2| {
-                let (chain, _) = chain.walk(&scene, start(&example), &example.aim(by)).ok()?;
+                let (chain, _) = chain.walk(&scene, &start(&example), &example.aim(by)).ok()?;
                 let moved = chain.surfaces().next()?.position - example.surfaces[0].position;
                 Some(DVec2::new(s.dot(moved), t.dot(moved)))
             };
@@ -264,7 +265,7 @@ fn flat_surfaces_have_the_textbook_solution() {
         let near = Turn::at(&scene, &surface, (start - old).normalize(), (goal - old).normalize()).unwrap();
         let onward = near.onward(&surface, (start - old).normalize()).unwrap();
         let chain = Chain::new(&scene, start, &[surface], old + onward).unwrap();
-        let (found, _) = chain.walk(&scene, Start::Point(start), &Goal::new(goal, [DVec3::X, DVec3::Y])).unwrap();
+        let (found, _) = chain.walk(&scene, &Node::lens(start), &Goal::new(goal, [DVec3::X, DVec3::Y])).unwrap();
         found.surfaces().next().unwrap().position
     };
     let mirrored = start + (goal * DVec3::new(1.0, 1.0, -1.0) - start) * (1.0 / 1.6);
@@ -293,7 +294,7 @@ fn geometric_terms_have_the_textbook_values() {
         let scene = Caster::new(&scene);
         let surface = scene.intersect(Origin::from(at + DVec3::Z), -DVec3::Z).unwrap();
         let chain = Chain::new(&scene, start, &[surface], end).unwrap();
-        chain.geometric_term(&scene, Start::Point(start), &Goal::new(end, plane)).unwrap()
+        chain.geometric_term(&scene, &Node::lens(start), &Goal::new(end, plane)).unwrap()
     };
     let start = DVec3::new(0.2, 0.1, above);
     for sine in [0.05f64, 0.3, 0.7, 0.95] {
@@ -326,7 +327,7 @@ fn what_cannot_walk_is_rejected() {
         let case = Case { name: "", scene: solid(glass(eta), ball), reflects: &[false, false] };
         let example = example(&case, &caster, &mut Stream::new(3, &[])).unwrap();
         let chain = example.chain(&caster);
-        chain.walk(&caster, Start::Point(example.start), &example.aim(DVec2::splat(0.002))).map(|(_, steps)| steps)
+        chain.walk(&caster, &Node::lens(example.start), &example.aim(DVec2::splat(0.002))).map(|(_, steps)| steps)
     };
     assert!(with(1.5).is_ok());
     assert_eq!(with(1.0), Err(Rejection::Singular));
@@ -339,10 +340,10 @@ fn what_cannot_walk_is_rejected() {
     assert_eq!(long.err(), Some(Rejection::TooLong));
     let goal = |at: DVec3| Goal::new(at, [DVec3::X, DVec3::Y]);
     let empty = Chain::new(&scene, start, &[], end).unwrap();
-    assert_eq!(empty.walk(&scene, Start::Point(start), &goal(end)).err(), Some(Rejection::Unsuitable));
+    assert_eq!(empty.walk(&scene, &Node::lens(start), &goal(end)).err(), Some(Rejection::Unsuitable));
     // Behind the ball, where no single reflection leads, and where numbers end.
     let chain = Chain::new(&scene, start, &[surface], end).unwrap();
     for at in [DVec3::new(0.0, 0.0, -3.0), DVec3::splat(f64::NAN), DVec3::splat(f64::INFINITY), start] {
-        assert!(chain.walk(&scene, Start::Point(start), &goal(at)).is_err() || at == start, "{at}");
+        assert!(chain.walk(&scene, &Node::lens(start), &goal(at)).is_err() || at == start, "{at}");
     }
 }

@@ -1,19 +1,20 @@
 //! Options of the methods with chains.
 
 use crate::markov::{FilmSteps, Jumps, LargeSteps, Mutations, MutationsError, SmallStep};
+use crate::path_space::{Kind, PathMutations};
 use clap::{Args, ValueEnum};
 
 /// How chains move. Each option says which methods hear it.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Chains (pssmlt, mmlt, rjmlt)")]
+#[command(next_help_heading = "Chains (pssmlt, mmlt, rjmlt, mlt, fused)")]
 pub(super) struct MutationArguments {
     /// Probability of a large step.
     #[arg(long, value_name = "P", default_value_t = 0.3, allow_negative_numbers = true)]
     large_step: f64,
-    /// How jumps between techniques come about: rjmlt.
+    /// How jumps between techniques come about: rjmlt, fused.
     #[arg(long, value_enum, default_value_t = Jumps::Separate)]
     jumps: Jumps,
-    /// Probability of a jump, where jumps are separate: rjmlt.
+    /// Probability of a jump, where jumps are separate: rjmlt, fused.
     #[arg(long, value_name = "P", default_value_t = 0.05, allow_negative_numbers = true)]
     jump: f64,
     /// By what distribution numbers move.
@@ -29,13 +30,19 @@ pub(super) struct MutationArguments {
     /// Small steps leave discrete choices, of lobes and lights, as they are.
     #[arg(long)]
     keep_choices: bool,
-    /// Small steps keep directions where surfaces change: mmlt, rjmlt.
+    /// Small steps keep directions where surfaces change: mmlt, rjmlt, fused.
     #[arg(long)]
     controlled_steps: bool,
-    /// Large steps of paths with at least this many edges try all techniques of two full walks: mmlt, rjmlt.
+    /// Large steps of paths with at least this many edges try all techniques of two full walks: mmlt, rjmlt, fused.
     #[arg(long, value_name = "EDGES")]
     tries_from: Option<usize>,
-    /// How direct light is rendered: mmlt, rjmlt.
+    /// Share of the small steps in whose place paths move in path space: fused.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.5, allow_negative_numbers = true)]
+    path_step: f64,
+    /// How paths move in path space: mlt, fused.
+    #[arg(long, value_enum, value_name = "KINDS", value_delimiter = ',', default_values_t = Kind::ALL)]
+    path_mutations: Vec<Kind>,
+    /// How direct light is rendered.
     #[arg(long, value_enum, default_value_t = Direct::Separate)]
     direct: Direct,
 }
@@ -86,6 +93,8 @@ impl MutationArguments {
             controlled: self.controlled_steps,
             large_steps: self.tries_from.map_or(LargeSteps::Plain, LargeSteps::TriesFrom),
             separate_direct: self.direct == Direct::Separate,
+            path_space: PathMutations { kinds: self.path_mutations.clone().into(), ..PathMutations::default() },
+            path_step: self.path_step,
         }
         .checked()
     }

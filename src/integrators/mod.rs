@@ -9,6 +9,7 @@ mod checkpoint;
 mod grid;
 mod light;
 mod merge;
+mod mlt;
 mod mmlt;
 mod path;
 mod photons;
@@ -49,6 +50,10 @@ pub enum Method {
     Mmlt,
     /// The same with reversible jumps between techniques.
     Rjmlt,
+    /// Metropolis light transport in path space, with manifold exploration.
+    Mlt,
+    /// The two before in one: jumps between techniques, and mutations in both spaces.
+    Fused,
 }
 
 impl Method {
@@ -63,6 +68,8 @@ impl Method {
             Self::Pssmlt => "pssmlt",
             Self::Mmlt => "mmlt",
             Self::Rjmlt => "rjmlt",
+            Self::Mlt => "mlt",
+            Self::Fused => "fused",
         }
     }
 
@@ -70,7 +77,7 @@ impl Method {
     pub fn has_chains(self) -> bool {
         match self {
             Self::Path | Self::Light | Self::Bdpt | Self::Sppm | Self::Vcm => false,
-            Self::Pssmlt | Self::Mmlt | Self::Rjmlt => true,
+            Self::Pssmlt | Self::Mmlt | Self::Rjmlt | Self::Mlt | Self::Fused => true,
         }
     }
 
@@ -102,6 +109,8 @@ pub struct Counts {
     pub acceptance: BTreeMap<&'static str, Vec<Acceptance>>,
     /// Chains by length.
     pub chains: Vec<ChainReport>,
+    /// Mutations in path space that came to nothing, by cause.
+    pub rejections: BTreeMap<&'static str, u64>,
 }
 
 /// Chains of one target.
@@ -135,6 +144,7 @@ enum Integrator {
     Vcm(vcm::Vcm),
     Pssmlt(Box<pssmlt::Pssmlt>),
     Mmlt(Box<mmlt::Mmlt>),
+    Mlt(Box<mlt::Mlt>),
 }
 
 impl Integrator {
@@ -148,6 +158,8 @@ impl Integrator {
             Method::Pssmlt => Self::Pssmlt(Box::new(pssmlt::Pssmlt::start(scene, settings))),
             Method::Mmlt => Self::Mmlt(Box::new(mmlt::Mmlt::start(scene, settings, mmlt::Family::Multiplexed))),
             Method::Rjmlt => Self::Mmlt(Box::new(mmlt::Mmlt::start(scene, settings, mmlt::Family::Jumping))),
+            Method::Fused => Self::Mmlt(Box::new(mmlt::Mmlt::start(scene, settings, mmlt::Family::Fused))),
+            Method::Mlt => Self::Mlt(Box::new(mlt::Mlt::start(scene, settings))),
         }
     }
 
@@ -155,7 +167,7 @@ impl Integrator {
     /// where they have walked to, so a render by chains must not go on from a film alone ([`Method::resumes`]).
     fn skip(&mut self, passes: u64) {
         match self {
-            Self::Path(_) | Self::Light(_) | Self::Bdpt(_) | Self::Pssmlt(_) | Self::Mmlt(_) => {}
+            Self::Path(_) | Self::Light(_) | Self::Bdpt(_) | Self::Pssmlt(_) | Self::Mmlt(_) | Self::Mlt(_) => {}
             Self::Sppm(sppm) => (0..passes).for_each(|pass| sppm.shrink(pass)),
             Self::Vcm(vcm) => (0..passes).for_each(|pass| vcm.shrink(pass)),
         }
@@ -171,6 +183,7 @@ impl Integrator {
             Self::Vcm(vcm) => vcm.pass(scene, film, pass, counts),
             Self::Pssmlt(pssmlt) => pssmlt.pass(scene, film, pass, counts),
             Self::Mmlt(mmlt) => mmlt.pass(scene, film, pass, counts),
+            Self::Mlt(mlt) => mlt.pass(scene, film, pass, counts),
         }
     }
 }

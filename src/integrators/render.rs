@@ -259,7 +259,7 @@ impl Outcome {
     pub fn summary(&self) -> Map<String, Value> {
         const PUBLISHED: [&str; 8] = ["integrator", "seed", "wall_s", "cpu_s", "samples", "rays", "passes", "health"];
         let mut summary = Map::new();
-        for name in PUBLISHED.into_iter().chain(["acceptance", "chains", "error"]) {
+        for name in PUBLISHED.into_iter().chain(["acceptance", "chains", "rejections", "error"]) {
             if let Some(value) = self.image.manifest.get(name) {
                 summary.insert(name.to_owned(), value.clone());
             }
@@ -303,6 +303,9 @@ fn manifest(scene: &Scene, method: Method, settings: &Settings, outcome: &Outcom
     if !outcome.counts.acceptance.is_empty() {
         set("acceptance", json!(outcome.counts.acceptance));
         set("chains", json!(outcome.counts.chains));
+    }
+    if !outcome.counts.rejections.is_empty() {
+        set("rejections", json!(outcome.counts.rejections));
     }
     set("classes", Value::Object(classes));
     manifest

@@ -13,7 +13,7 @@ mod constraint;
 mod walk;
 
 pub use constraint::{Derivatives, derivatives, offset, transfer};
-pub use walk::{Chain, Goal, MOST_LINKS, MOST_STEPS, Rejection, Start};
+pub use walk::{Chain, Goal, MOST_LINKS, MOST_STEPS, Rejection};
 
 use crate::bsdf::fresnel;
 use crate::scene::{Scene, Surface};

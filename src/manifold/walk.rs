@@ -1,7 +1,8 @@
 //! Walks of a chain to a new end.
 
 use super::{Turn, derivatives, transfer};
-use crate::scene::{Caster, Origin, Patch, Surface};
+use crate::paths::Node;
+use crate::scene::{Caster, Patch, Surface};
 use arrayvec::ArrayVec;
 use glam::{DMat2, DVec2, DVec3};
 
@@ -11,32 +12,6 @@ pub const MOST_LINKS: usize = 12;
 pub const MOST_STEPS: usize = 20;
 /// A chain has arrived when it ends this close to the goal, relative to the longest of its edges.
 const CLOSE: f64 = 1e-11;
-
-/// The near end of a chain, which stays.
-#[derive(Clone, Copy, Debug)]
-pub enum Start<'a> {
-    /// A point in space, as on a lens.
-    Point(DVec3),
-    /// A point on a surface.
-    Surface(&'a Surface),
-}
-
-impl Start<'_> {
-    /// Where it is.
-    pub fn position(&self) -> DVec3 {
-        match self {
-            Self::Point(point) => *point,
-            Self::Surface(surface) => surface.position,
-        }
-    }
-
-    fn leave(&self, direction: DVec3) -> Origin {
-        match self {
-            Self::Point(point) => Origin::from(*point),
-            Self::Surface(surface) => surface.leave(direction),
-        }
-    }
-}
 
 /// The far end of a chain: a point, and a plane through it along which the chain may miss it.
 #[derive(Clone, Copy, Debug)]
@@ -64,8 +39,8 @@ impl Goal {
     }
 }
 
-/// Why a walk does not arrive.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Why a walk does not arrive, or is of no use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Rejection {
     /// The chain is too long.
     TooLong,
@@ -75,6 +50,24 @@ pub enum Rejection {
     Singular,
     /// It does not come closer, or not soon enough.
     Lost,
+    /// It arrives, but the walk back leads elsewhere.
+    OneWay,
+    /// Something lies in the way, or what is found carries no light.
+    Dark,
+}
+
+impl Rejection {
+    /// The name, as reports have it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::TooLong => "too_long",
+            Self::Unsuitable => "unsuitable",
+            Self::Singular => "singular",
+            Self::Lost => "lost",
+            Self::OneWay => "one_way",
+            Self::Dark => "dark",
+        }
+    }
 }
 
 /// The specular vertices of a chain, and what each does.
@@ -116,23 +109,36 @@ impl Chain {
     ///
     /// # Errors
     /// [`Rejection::Unsuitable`] where normals have no known derivatives, [`Rejection::Singular`].
-    pub fn transfer(&self, scene: &Caster<'_>, start: Start<'_>, goal: &Goal) -> Result<DMat2, Rejection> {
+    pub fn transfer(&self, scene: &Caster<'_>, start: &Node, goal: &Goal) -> Result<DMat2, Rejection> {
         self.follow(scene, start, goal).map(|(transfer, _)| transfer)
     }
 
     /// [`Chain::transfer`], and the first vertex's tangents.
-    fn follow(&self, scene: &Caster<'_>, start: Start<'_>, goal: &Goal) -> Result<(DMat2, [DVec3; 2]), Rejection> {
+    fn follow(&self, scene: &Caster<'_>, start: &Node, goal: &Goal) -> Result<(DMat2, [DVec3; 2]), Rejection> {
         let patches: ArrayVec<Patch, MOST_LINKS> = self.surfaces().map_while(|surface| scene.patch(surface)).collect();
         if patches.len() < self.0.len() {
             return Err(Rejection::Unsuitable);
         }
         // It does not move, so only its place is of account.
-        let fixed = Patch { position: start.position(), ..goal.0 };
+        let fixed = Patch { position: start.position, ..goal.0 };
         let links = patches.iter().zip(&self.0).enumerate().map(|(i, (here, (_, turn)))| {
             let before = if i == 0 { &fixed } else { &patches[i - 1] };
             derivatives(before, (here, *turn), patches.get(i + 1).unwrap_or(&goal.0))
         });
         Ok((transfer(links).ok_or(Rejection::Singular)?, patches.first().unwrap_or(&goal.0).tangents))
+    }
+
+    /// How much solid angle at the near end an area of the goal's plane fills, seen along the chain, in 1 / squared scene
+    /// unit.
+    ///
+    /// # Errors
+    /// As [`Chain::transfer`].
+    pub fn spread(&self, scene: &Caster<'_>, start: &Node, goal: &Goal) -> Result<f64, Rejection> {
+        let (first, _) = self.0.first().ok_or(Rejection::Unsuitable)?;
+        let edge = first.position - start.position;
+        let arriving = first.geometric.dot(edge.normalize()).abs();
+        let transfer = self.transfer(scene, start, goal)?;
+        Ok(arriving / edge.length_squared() * transfer.determinant().abs())
     }
 
     /// The generalised geometric term of the chain: how much projected solid angle at the near end an area of the goal's
@@ -141,23 +147,15 @@ impl Chain {
     ///
     /// # Errors
     /// As [`Chain::transfer`].
-    pub fn geometric_term(&self, scene: &Caster<'_>, start: Start<'_>, goal: &Goal) -> Result<f64, Rejection> {
+    pub fn geometric_term(&self, scene: &Caster<'_>, start: &Node, goal: &Goal) -> Result<f64, Rejection> {
         let (first, _) = self.0.first().ok_or(Rejection::Unsuitable)?;
-        let edge = first.position - start.position();
-        let (direction, squared) = (edge.normalize(), edge.length_squared());
-        let leaving = match start {
-            Start::Point(_) => 1.0,
-            Start::Surface(surface) => surface.geometric.dot(direction).abs(),
-        };
-        let arriving = first.geometric.dot(direction).abs();
-        let transfer = self.transfer(scene, start, goal)?;
-        Ok(leaving * arriving / squared * transfer.determinant().abs())
+        Ok(start.cos((first.position - start.position).normalize()) * self.spread(scene, start, goal)?)
     }
 
     /// The same chain when it sets out towards `first`; `None` where it meets something else on its way.
-    fn trace(&self, scene: &Caster<'_>, start: Start<'_>, first: DVec3) -> Option<Traced> {
+    fn trace(&self, scene: &Caster<'_>, start: &Node, first: DVec3) -> Option<Traced> {
         let mut links = ArrayVec::new();
-        let mut direction = (first - start.position()).try_normalize()?;
+        let mut direction = (first - start.position).try_normalize()?;
         let mut origin = start.leave(direction);
         for (old, turn) in &self.0 {
             let surface = scene.intersect(origin, direction)?;
@@ -183,7 +181,7 @@ impl Chain {
     ///
     /// # Errors
     /// What [`Rejection`] lists.
-    pub fn walk(&self, scene: &Caster<'_>, start: Start<'_>, goal: &Goal) -> Result<(Self, usize), Rejection> {
+    pub fn walk(&self, scene: &Caster<'_>, start: &Node, goal: &Goal) -> Result<(Self, usize), Rejection> {
         let Some((first, _)) = self.0.first() else { return Err(Rejection::Unsuitable) };
         let mut now = self.trace(scene, start, first.position).ok_or(Rejection::Unsuitable)?;
         let mut miss = now.miss(goal).ok_or(Rejection::Unsuitable)?;
@@ -215,8 +213,8 @@ impl Chain {
         Ok((now.chain, steps))
     }
 
-    fn longest(&self, start: Start<'_>, goal: &Goal) -> f64 {
-        let mut from = start.position();
+    fn longest(&self, start: &Node, goal: &Goal) -> f64 {
+        let mut from = start.position;
         let ends = self.surfaces().map(|surface| surface.position).chain([goal.0.position]);
         ends.map(|to| to.distance(std::mem::replace(&mut from, to))).fold(0.0, f64::max)
     }

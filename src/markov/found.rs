@@ -29,6 +29,19 @@ pub struct Found {
     pub technique: usize,
 }
 
+/// Fresh random numbers, for walks that do not end at random.
+struct Fresh<'a>(&'a mut Stream);
+
+impl Rows for Fresh<'_> {
+    fn row(&mut self, _index: usize) -> Row {
+        self.0.row()
+    }
+
+    fn roulette(&self) -> bool {
+        false
+    }
+}
+
 /// Finds paths of one length. The rows of a state are one for the choice of the technique, those of the camera's walk, and
 /// those of the light's.
 #[derive(Clone, Copy, Debug)]
@@ -78,6 +91,21 @@ impl Tracer {
         let first = state.row(Self::CAMERA_ROWS, stream);
         self.walk_camera(scene, first, &mut state.rows(Self::CAMERA_ROWS, false, stream), t, path)?;
         self.walk_light(scene, &mut state.rows(self.light_rows(), false, stream), s, path)?;
+        self.connect(scene, path, health)
+    }
+
+    /// A path of any technique, all as likely, left in `path`; `None` where it carries no light.
+    pub fn sample(
+        self,
+        scene: &Caster<'_>,
+        stream: &mut Stream,
+        path: &mut FullPath,
+        health: &mut Health,
+    ) -> Option<Found> {
+        let s = self.technique(stream.number());
+        let first = stream.row();
+        self.walk_camera(scene, first, &mut Fresh(stream), self.techniques() - s, path)?;
+        self.walk_light(scene, &mut Fresh(stream), s, path)?;
         self.connect(scene, path, health)
     }
 

@@ -90,6 +90,23 @@ fn invert(
     Some(())
 }
 
+/// Has the state's proposal lead to `path` by the technique that has found it. `None` where it cannot.
+pub fn retell(scene: &Scene, path: &FullPath, state: &mut ChainState, stream: &mut Stream) -> Option<()> {
+    let (tracer, s) = (Tracer { edges: path.edges() }, path.light.vertices.len());
+    for m in 0..s {
+        state.set(tracer.light_rows() + m, path.light_row(scene, m, stream.row())?);
+    }
+    let first = path.camera_row(scene, 1, stream.row())?;
+    let [x, y, ..] = stream.row();
+    let seen = s < tracer.edges;
+    // The technique that connects with the lens finds the film position by itself.
+    state.set(Tracer::CAMERA_ROWS, if seen { first } else { [x, y, first[2], first[3]] });
+    for c in 2..tracer.techniques() - s {
+        state.set(Tracer::CAMERA_ROWS + c - 1, path.camera_row(scene, c, stream.row())?);
+    }
+    Some(())
+}
+
 /// Forgets the rows that technique `from` reads and `to` does not.
 fn forget(path: &FullPath, from: usize, to: usize, state: &mut ChainState, stream: &mut Stream) {
     let tracer = Tracer { edges: path.edges() };

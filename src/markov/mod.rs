@@ -20,7 +20,7 @@ mod tries;
 
 pub use controlled::{ControlledMemory, controlled_step, remainder};
 pub use found::{Found, TECHNIQUES, Tracer};
-pub use jump::{Jump, JumpMemory, jump};
+pub use jump::{Jump, JumpMemory, jump, retell};
 pub use settings::{FilmSteps, Jumps, LargeSteps, Mutations, MutationsError, Scales};
 pub use small_step::SmallStep;
 pub use state::{ChainState, Proposal};

@@ -2,6 +2,7 @@
 
 use super::SmallStep;
 use crate::math::{Row, Walk};
+use crate::path_space::{PathMutations, Radii};
 use crate::paths::{Use, uses};
 use serde::{Deserialize, Serialize};
 
@@ -59,6 +60,10 @@ pub struct Mutations {
     pub large_steps: LargeSteps,
     /// Whether direct light is rendered by path tracing.
     pub separate_direct: bool,
+    /// How paths move in path space, in mlt and fused.
+    pub path_space: PathMutations,
+    /// Share of the small steps in whose place paths move in path space, in fused.
+    pub path_step: f64,
 }
 
 impl Default for Mutations {
@@ -73,6 +78,8 @@ impl Default for Mutations {
             controlled: false,
             large_steps: LargeSteps::Plain,
             separate_direct: true,
+            path_space: PathMutations::default(),
+            path_step: 0.5,
         }
     }
 }
@@ -89,6 +96,9 @@ pub enum MutationsError {
     /// A length of steps that is none.
     #[error("the size of small steps is {0}; expected a number above 0, at most 0.5")]
     Step(f64),
+    /// Angles of perturbations that are none.
+    #[error("the angles of perturbations go from {0} to {1}; expected ascending numbers above 0, at most 1")]
+    Angles(f64, f64),
 }
 
 impl Mutations {
@@ -103,6 +113,14 @@ impl Mutations {
         }
         if large + self.jump > 1.0 {
             return Err(MutationsError::Sum(large, self.jump));
+        }
+        if !(0.0..=1.0).contains(&self.path_step) {
+            let expected = "a number from 0 to 1";
+            return Err(MutationsError::Probability("a mutation in path space", self.path_step, expected));
+        }
+        let Radii { least, most } = self.path_space.angles;
+        if !(least > 0.0 && least < most && most <= 1.0) {
+            return Err(MutationsError::Angles(least, most));
         }
         let size = self.small_step.size();
         if !(size > 0.0 && size <= 0.5) {
@@ -193,6 +211,11 @@ mod tests {
             Mutations { large_step: 0.9, jump: 0.2, ..usual },
             Mutations { small_step: SmallStep::Gaussian { deviation: 0.0 }, ..usual },
             Mutations { small_step: SmallStep::Kelemen { least: 0.1, most: 0.7 }, ..usual },
+            Mutations { path_step: 1.1, ..usual },
+            Mutations {
+                path_space: PathMutations { angles: Radii { least: 0.1, most: 0.1 }, ..usual.path_space },
+                ..usual
+            },
         ];
         for mutations in bad {
             assert!(mutations.checked().is_err(), "{mutations:?}");

@@ -29,12 +29,33 @@ pub struct Connection {
 /// `None` where nothing is contributed.
 #[inline]
 pub fn connect(scene: &Caster<'_>, light: &[Vertex], camera: &[Vertex], techniques: &Techniques) -> Option<Connection> {
+    connect_if::<false>(scene, light, camera, techniques)
+}
+
+/// [`connect`] for subpaths whose ends are known to see each other.
+pub fn connect_visible(
+    scene: &Caster<'_>,
+    light: &[Vertex],
+    camera: &[Vertex],
+    techniques: &Techniques,
+) -> Option<Connection> {
+    connect_if::<true>(scene, light, camera, techniques)
+}
+
+/// [`connect`]; `VISIBLE` says whether the ends are known to see each other.
+#[inline]
+fn connect_if<const VISIBLE: bool>(
+    scene: &Caster<'_>,
+    light: &[Vertex],
+    camera: &[Vertex],
+    techniques: &Techniques,
+) -> Option<Connection> {
     let end = camera.last()?;
     match (light.last(), &end.kind) {
         (None, _) => see_light(scene, camera, techniques),
         (Some(_), VertexKind::Environment(_)) => None,
-        (Some(start), VertexKind::Camera) => reach_camera(scene, light, start, camera, techniques),
-        (Some(start), _) => join(scene, light, start, camera, end, techniques),
+        (Some(start), VertexKind::Camera) => reach_camera::<VISIBLE>(scene, light, start, camera, techniques),
+        (Some(start), _) => join::<VISIBLE>(scene, light, start, camera, end, techniques),
     }
 }
 
@@ -143,7 +164,7 @@ fn arrival(scene: &Caster<'_>, onward: &Onward, vertex: &Vertex, direction: DVec
 
 /// s ≥ 1, t ≥ 2: both ends on surfaces, or the light's end on a light.
 #[inline]
-fn join(
+fn join<const VISIBLE: bool>(
     scene: &Caster<'_>,
     light: &[Vertex],
     start: &Vertex,
@@ -169,11 +190,11 @@ fn join(
     if value.is_black() {
         return None;
     }
-    let clear = match infinite {
+    let clear = || match infinite {
         Some(towards) => scene.escapes(camera_end.origin, towards),
         None => scene.visible(camera_end.origin, light_end.origin.point),
     };
-    if !clear {
+    if !(VISIBLE || clear()) {
         return None;
     }
     let junction = Junction {
@@ -188,7 +209,7 @@ fn join(
 }
 
 /// t = 1: the walk from the light is connected with the lens.
-fn reach_camera(
+fn reach_camera<const VISIBLE: bool>(
     scene: &Caster<'_>,
     light: &[Vertex],
     start: &Vertex,
@@ -205,7 +226,7 @@ fn reach_camera(
     let Sight { lens, direction, film, density } = scene.camera.sight(camera[0].position, start.position)?;
     let light_end = end_of(scene, light, -direction, Walk::FromLight)?;
     let value = start.throughput * light_end.value * density;
-    if value.is_black() || !scene.seen(light_end.origin, start.surface(), lens) {
+    if value.is_black() || !(VISIBLE || scene.seen(light_end.origin, start.surface(), lens)) {
         return None;
     }
     let normal = match &start.kind {

@@ -37,13 +37,13 @@ impl FullPath {
     }
 
     /// Vertex x_m, from 0 on the light to k on the lens.
-    fn vertex(&self, m: usize) -> &Vertex {
+    pub(super) fn vertex(&self, m: usize) -> &Vertex {
         let s = self.light.vertices.len();
         if m < s { &self.light.vertices[m] } else { &self.camera.vertices[self.edges() - m] }
     }
 
     /// The light that x_0 lies on, and where.
-    fn start(&self) -> Option<(EmitterId, Start)> {
+    pub(super) fn start(&self) -> Option<(EmitterId, Start)> {
         let vertex = self.vertex(0);
         match &vertex.kind {
             VertexKind::Light(id, start) => Some((*id, *start)),
@@ -71,7 +71,7 @@ impl FullPath {
     }
 
     /// Whether x_m scatters by a delta lobe: no end of the connection does, however its walk might have gone on.
-    fn scatters_delta(&self, m: usize) -> bool {
+    pub(super) fn scatters_delta(&self, m: usize) -> bool {
         let s = self.light.vertices.len();
         m + 1 != s && m != s && self.vertex(m).delta
     }

@@ -5,6 +5,7 @@
 //! all integrators; they differ in where the rows of primary samples come from.
 
 mod connect;
+mod course;
 mod direct;
 mod full;
 mod merge;
@@ -13,7 +14,8 @@ mod rows;
 mod subpath;
 mod trace;
 
-pub use connect::{Connection, connect};
+pub use connect::{Connection, connect, connect_visible};
+pub use course::{Course, Node};
 pub use direct::{Direct, direct_pdf, sample_direct};
 pub use full::{Event, FullPath};
 pub use merge::merge;

@@ -2,6 +2,7 @@
 
 use super::rows::Rows;
 use super::subpath::{Subpath, Vertex, VertexKind};
+use crate::bsdf::Scatter;
 use crate::emitter::{Emitter, Start};
 use crate::film::Word;
 use crate::geometry::offset::OFFSET;
@@ -24,22 +25,8 @@ pub fn trace_camera(
     path.vertices.clear();
     path.film = film;
     let (lens, direction) = scene.camera.ray(film, first);
-    path.vertices.push(Vertex {
-        kind: VertexKind::Camera,
-        position: lens,
-        back: DVec3::ZERO,
-        throughput: Spectrum::ONE,
-        forward: AreaPdf(1.0),
-        reverse: AreaPdf(0.0),
-        connects: true,
-        delta: false,
-        word: Word::EMPTY,
-        preference: 1.0,
-    });
-    // As for a light, the density of the first surface is known to where the walk starts.
-    let pdf = SolidAnglePdf(0.0);
-    let walker = Walker { origin: lens.into(), direction, throughput: Spectrum::ONE, pdf, word: Word::EMPTY };
-    walk(scene, walker, Walk::FromCamera, rows, vertices, roulette_from, path);
+    path.vertices.push(on_lens(lens));
+    walk(scene, Walker::from_lens(lens, direction), Walk::FromCamera, rows, vertices, roulette_from, path);
 }
 
 /// Walks from a light, up to `vertices` vertices, of which the first lies on the light.
@@ -62,13 +49,7 @@ pub fn trace_light(
     }
     let Some((origin, direction, weight)) = scene.emitter(id).emit(&start, rows.row(1)) else { return };
     let normal = if let Start::Surface { normal, .. } = start { normal } else { DVec3::ZERO };
-    let walker = Walker {
-        origin: (origin + normal * light_offset(origin)).into(),
-        direction,
-        throughput: weight * vertex.throughput,
-        pdf: SolidAnglePdf(0.0),
-        word: Word::EMPTY,
-    };
+    let walker = Walker::start((origin + normal * light_offset(origin)).into(), direction, weight * vertex.throughput);
     walk(scene, walker, Walk::FromLight, rows, vertices, roulette_from, path);
 }
 
@@ -90,7 +71,7 @@ pub fn light_vertex(scene: &Caster<'_>, row: Row) -> Option<Vertex> {
 
 /// The vertex where light starts, found with density `pdf`.
 #[inline]
-fn on_light(id: EmitterId, start: Start, pdf: AreaPdf) -> Vertex {
+pub(super) fn on_light(id: EmitterId, start: Start, pdf: AreaPdf) -> Vertex {
     let position = match start {
         Start::Surface { position, .. } | Start::Point { position } => position,
         Start::Infinite { .. } | Start::Distant { .. } => DVec3::ZERO,
@@ -116,13 +97,41 @@ pub(super) fn light_offset(position: DVec3) -> f64 {
 }
 
 /// The end of a walk that goes on.
-struct Walker {
-    origin: Origin,
-    direction: DVec3,
-    throughput: Spectrum,
-    /// Density of `direction`.
-    pdf: SolidAnglePdf,
-    word: Word,
+pub(super) struct Walker {
+    pub origin: Origin,
+    pub direction: DVec3,
+    pub throughput: Spectrum,
+    /// Density of `direction`; unused where a walk starts, where the density of the first surface is known at once.
+    pub pdf: SolidAnglePdf,
+    pub word: Word,
+}
+
+impl Walker {
+    /// Leaves the point `lens` of the lens.
+    pub(super) fn from_lens(lens: DVec3, direction: DVec3) -> Self {
+        Self::start(lens.into(), direction, Spectrum::ONE)
+    }
+
+    /// Leaves a light or the lens.
+    pub(super) fn start(origin: Origin, direction: DVec3, throughput: Spectrum) -> Self {
+        Self { origin, direction, throughput, pdf: SolidAnglePdf(0.0), word: Word::EMPTY }
+    }
+}
+
+/// The vertex at the point `lens` of the lens.
+pub(super) fn on_lens(lens: DVec3) -> Vertex {
+    Vertex {
+        kind: VertexKind::Camera,
+        position: lens,
+        back: DVec3::ZERO,
+        throughput: Spectrum::ONE,
+        forward: AreaPdf(1.0),
+        reverse: AreaPdf(0.0),
+        connects: true,
+        delta: false,
+        word: Word::EMPTY,
+        preference: 1.0,
+    }
 }
 
 /// Extends `path`, whose first vertex is there, by `walker` and what it meets.
@@ -177,23 +186,33 @@ fn walk(
         if weight.is_black() {
             return;
         }
-        path.vertices[last + 1].delta = scatter.delta;
-        path.vertices[last].reverse = reverse_pdf(&path.vertices[last], &vertex, scatter.pdf_reverse);
-        let word = match mode {
-            Walk::FromCamera => vertex.word.preceded_by(scatter.letter),
-            Walk::FromLight => vertex.word.then(scatter.letter),
-        };
-        walker = Walker {
-            origin: surface.leave(direction),
-            direction,
-            throughput: vertex.throughput * weight,
-            pdf: scatter.pdf,
-            word,
-        };
+        walker = go_on(path, &surface, &scatter, weight, direction, mode);
     }
 }
 
-fn environment_vertex(id: EmitterId, walker: &Walker) -> Vertex {
+/// Leaves the last vertex of `path`, which lies on `surface`, along `direction`, where `weight` is what is left.
+#[inline]
+pub(super) fn go_on(
+    path: &mut Subpath,
+    surface: &Surface,
+    scatter: &Scatter,
+    weight: Spectrum,
+    direction: DVec3,
+    mode: Walk,
+) -> Walker {
+    let last = path.vertices.len() - 1;
+    let vertex = &mut path.vertices[last];
+    vertex.delta = scatter.delta;
+    let (throughput, word) = (vertex.throughput * weight, vertex.word);
+    path.vertices[last - 1].reverse = reverse_pdf(&path.vertices[last - 1], &path.vertices[last], scatter.pdf_reverse);
+    let word = match mode {
+        Walk::FromCamera => word.preceded_by(scatter.letter),
+        Walk::FromLight => word.then(scatter.letter),
+    };
+    Walker { origin: surface.leave(direction), direction, throughput, pdf: scatter.pdf, word }
+}
+
+pub(super) fn environment_vertex(id: EmitterId, walker: &Walker) -> Vertex {
     Vertex {
         kind: VertexKind::Environment(id),
         position: walker.origin.point,
@@ -209,7 +228,7 @@ fn environment_vertex(id: EmitterId, walker: &Walker) -> Vertex {
 }
 
 #[inline]
-fn surface_vertex(scene: &Caster<'_>, surface: &Surface, walker: &Walker, previous: &Vertex) -> Vertex {
+pub(super) fn surface_vertex(scene: &Caster<'_>, surface: &Surface, walker: &Walker, previous: &Vertex) -> Vertex {
     let cos = surface.geometric.dot(walker.direction);
     let distance_squared = (surface.position - previous.position).length_squared();
     let forward = match &previous.kind {

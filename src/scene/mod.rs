@@ -186,6 +186,11 @@ impl Scene {
         self.environment
     }
 
+    /// Radius of a sphere around all surfaces, in scene units.
+    pub fn radius(&self) -> f64 {
+        self.bvh.bounds().bounding_sphere().1
+    }
+
     /// Whether anything shines.
     pub fn has_lights(&self) -> bool {
         self.lights.is_some()

@@ -5,16 +5,33 @@ use super::{Family, Share};
 use crate::film::{Health, Kernel, Splats};
 use crate::markov::{
     ChainState, ControlledMemory, Found, Jump, JumpMemory, Jumps, Mutations, Tracer, Tries, controlled_step, jump,
+    retell,
 };
 use crate::math::Stream;
+use crate::path_space::{Kind, PathSpace, Proposed, Target};
 use crate::paths::FullPath;
 use crate::scene::{Caster, Scene};
+use std::collections::BTreeMap;
 
 /// Names of the tallies.
-pub(super) const KINDS: [&str; 3] = ["large_step", "small_step", "technique_change"];
+pub(super) const KINDS: [&str; 8] = [
+    "large_step",
+    "small_step",
+    "technique_change",
+    Kind::ALL[0].name(),
+    Kind::ALL[1].name(),
+    Kind::ALL[2].name(),
+    Kind::ALL[3].name(),
+    Kind::ALL[4].name(),
+];
 const LARGE: usize = 0;
 const SMALL: usize = 1;
 const CHANGE: usize = 2;
+/// The first of the mutations in path space.
+const PATH: usize = 3;
+
+/// How far the target may be off, relative to itself, after the way to rows and back.
+const ROUND_TRIP: f64 = 1e-6;
 
 /// One chain.
 pub(super) struct Chain {
@@ -29,11 +46,14 @@ pub(super) struct Chain {
     pub tallies: [[u64; 2]; KINDS.len()],
     /// Jumps for which no rows could be found.
     pub failed: u64,
+    /// Mutations in path space that came to nothing, by cause.
+    pub rejections: BTreeMap<&'static str, u64>,
 }
 
 impl Chain {
     pub(super) fn new(state: ChainState, stream: Stream, current: Found, path: FullPath) -> Self {
-        Self { state, stream, current, weight: 0.0, path, tallies: Default::default(), failed: 0 }
+        let (tallies, rejections) = (Default::default(), BTreeMap::new());
+        Self { state, stream, current, weight: 0.0, path, tallies, failed: 0, rejections }
     }
 
     fn tally(&mut self, kind: usize, accepted: bool) {
@@ -63,6 +83,9 @@ pub(super) struct Lane {
     tries: Tries,
     jumps: JumpMemory,
     controlled: ControlledMemory,
+    path_space: PathSpace,
+    /// What the rows of a path lead to.
+    returned: FullPath,
 }
 
 /// What the mutations of one length work on in a pass.
@@ -97,6 +120,8 @@ impl Lane {
             tries: Tries::default(),
             jumps: JumpMemory::default(),
             controlled: ControlledMemory::default(),
+            path_space: PathSpace::new(mutations.path_space, Target::Technique),
+            returned: FullPath::default(),
         }
     }
 
@@ -155,7 +180,7 @@ impl Lane {
                 false => self.large_step(chain, work),
             };
         }
-        if self.family == Family::Jumping {
+        if self.family != Family::Multiplexed {
             let separate = self.mutations.jumps == Jumps::Separate;
             let alone = separate && kind < large + self.mutations.jump;
             if alone || !separate {
@@ -165,6 +190,9 @@ impl Lane {
                 chain.weight += 1.0;
                 return;
             }
+        }
+        if self.family == Family::Fused && chain.stream.number() < self.mutations.path_step {
+            return self.path_step(chain, work);
         }
         self.small_step(chain, work);
     }
@@ -203,7 +231,7 @@ impl Lane {
         } else {
             let technique = match family {
                 Family::Multiplexed => tracer.technique(state.row(Tracer::TECHNIQUE_ROW, stream)[0]),
-                Family::Jumping => before,
+                Family::Jumping | Family::Fused => before,
             };
             let found = tracer.find(scene, technique, state, stream, proposal, health);
             (technique, found.map(|found| (found, 1.0)))
@@ -213,6 +241,50 @@ impl Lane {
         if technique != before {
             chain.tally(CHANGE, accepted);
         }
+    }
+
+    /// A mutation in path space, of a path that keeps its technique (Otsu 2017, algorithm 1 of chapter 6).
+    fn path_step(&mut self, chain: &mut Chain, work: &mut Work<'_>) {
+        let Chain { state, stream, current, path, rejections, .. } = chain;
+        let Work { scene, tracer, .. } = *work;
+        let Self { path_space, proposal, returned, health, .. } = self;
+        let Proposed { kind, outcome } = path_space.propose(scene, (path, current), stream, proposal, health);
+        let Some(kind) = kind else {
+            chain.weight += 1.0;
+            return;
+        };
+        state.propose(false);
+        let mut reject = |cause: &'static str| *rejections.entry(cause).or_default() += 1;
+        let mut judged = match outcome {
+            Ok(_) if retell(scene, proposal, state, stream).is_none() => {
+                reject("inversion");
+                None
+            }
+            Ok(judged) => Some(judged),
+            Err(cause) => {
+                reject(cause.name());
+                None
+            }
+        };
+        // What is about to be accepted must also be what its rows lead to (section 6.7.1).
+        if let Some((found, ratio)) = judged
+            && stream.clone().number() < ratio.min(1.0)
+        {
+            let back = tracer.find(scene, found.technique, state, stream, returned, health);
+            let same = |back: &Found| (back.luminance / found.luminance - 1.0).abs() < ROUND_TRIP;
+            match back.filter(same) {
+                Some(back) => {
+                    judged = Some((back, ratio));
+                    std::mem::swap(proposal, returned);
+                }
+                None => {
+                    reject("round_trip");
+                    judged = None;
+                }
+            }
+        }
+        let ratio = judged.map_or(0.0, |(_, ratio)| ratio);
+        self.decide(chain, PATH + kind as usize, judged.map(|(found, _)| found), ratio, work);
     }
 
     /// A large step among all techniques.

@@ -17,6 +17,7 @@ use super::{Acceptance, ChainReport, Counts, path::Path, render::Settings};
 use crate::film::{Film, Splats};
 use crate::markov::{ChainState, Mutations, Scales, Tracer};
 use crate::math::{Discrete, Stream, Walk};
+use crate::path_space::Kind;
 use crate::scene::{Caster, Scene};
 use lane::{Chain, Job, Lane};
 use rayon::prelude::*;
@@ -29,6 +30,8 @@ pub(super) enum Family {
     Multiplexed,
     /// From jumps: `rjmlt`.
     Jumping,
+    /// From jumps, while paths also move in path space: `fused`.
+    Fused,
 }
 
 /// One path length.
@@ -157,7 +160,10 @@ impl Mmlt {
                 let [proposed, accepted] = tallies.fold([0; 2], |[a, b], tally| [a + tally[0], b + tally[1]]);
                 Acceptance { length: length.tracer.edges, proposed, accepted }
             };
-            counts.acceptance.insert(name, self.lengths.iter().enumerate().map(sum).collect());
+            let lengths: Vec<Acceptance> = self.lengths.iter().enumerate().map(sum).collect();
+            if lengths.iter().any(|length| length.proposed > 0) || !Kind::ALL.iter().any(|kind| kind.name() == name) {
+                counts.acceptance.insert(name, lengths);
+            }
         }
         let report = |(index, length): (usize, &Length)| ChainReport {
             length: length.tracer.edges,
@@ -167,6 +173,10 @@ impl Mmlt {
             failed_inversions: chains(index).map(|chain| chain.failed).sum(),
         };
         counts.chains = self.lengths.iter().enumerate().map(report).collect();
+        counts.rejections.clear();
+        for (cause, count) in (0..self.lengths.len()).flat_map(chains).flat_map(|chain| &chain.rejections) {
+            *counts.rejections.entry(cause).or_default() += count;
+        }
     }
 }
 

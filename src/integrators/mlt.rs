@@ -1,0 +1,224 @@
+//! Metropolis light transport (Veach and Guibas 1997; Veach 1997, chapter 11) with manifold exploration (Jakob and Marschner
+//! 2012): chains of paths of all lengths, moved by the mutations of [`crate::path_space`].
+//!
+//! Each chain begins at one of many independent samples, drawn in proportion to their contribution, so that it has its
+//! stationary distribution from the first step on, and nothing need be thrown away. b, the mean luminance of the image,
+//! comes from these samples and from more of them in each pass.
+//!
+//! Light seen directly is rendered by path tracing, and so is direct light unless the settings say otherwise.
+
+use super::chains::{LANES, Mean, batch_samples, independent, share};
+use super::{Acceptance, ChainReport, Counts, path::Path, render::Settings};
+use crate::film::{Film, Health, Kernel, Splats};
+use crate::manifold::Rejection;
+use crate::markov::{Found, Tracer};
+use crate::math::{Discrete, Stream};
+use crate::path_space::{Kind, PathMutations, PathSpace, Proposed, Target};
+use crate::paths::{FullPath, Techniques, connect_visible};
+use crate::scene::{Caster, Scene};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// Mutations for each independent sample that refines b.
+const REFINEMENT: usize = 16;
+
+/// Lengths of the paths that chains find, in edges.
+#[derive(Clone, Copy)]
+struct Lengths {
+    least: usize,
+    most: usize,
+}
+
+impl Lengths {
+    fn count(self) -> usize {
+        (self.most + 1).saturating_sub(self.least)
+    }
+
+    /// A path of any of the lengths and techniques, all as likely, left in `path`; with its contribution over density.
+    fn sample(
+        self,
+        scene: &Caster<'_>,
+        stream: &mut Stream,
+        path: &mut FullPath,
+        health: &mut Health,
+    ) -> Option<Found> {
+        let edges = self.least + (stream.number() * self.count() as f64) as usize;
+        let found = Tracer { edges }.sample(scene, stream, path, health)?;
+        let scale = self.count() as f64;
+        Some(Found { value: found.value * scale, luminance: found.luminance * scale, ..found })
+    }
+}
+
+struct Chain {
+    stream: Stream,
+    /// Contribution over density by its technique, which has no weight.
+    current: Found,
+    path: FullPath,
+    /// How often the current path has been counted and not yet been splatted.
+    weight: f64,
+    /// By kind of mutation, proposals and accepted ones.
+    tallies: [[u64; 2]; Kind::ALL.len()],
+    /// Mutations that came to nothing, by cause.
+    rejections: BTreeMap<Rejection, u64>,
+}
+
+struct Lane {
+    chain: Option<Chain>,
+    mutations: PathSpace,
+    proposal: FullPath,
+    health: Health,
+}
+
+/// What a lane made in one pass.
+struct Job {
+    splats: Splats,
+    rays: u64,
+    health: Health,
+}
+
+/// The method with its chains.
+pub(super) struct Mlt {
+    seed: u64,
+    direct: Path,
+    lengths: Lengths,
+    size: [usize; 2],
+    mean: Mean,
+    batches: u64,
+    lanes: Vec<Lane>,
+}
+
+impl Mlt {
+    pub(super) fn start(scene: &Scene, settings: &Settings) -> Self {
+        let direct = settings.mutations.traced_edges();
+        let lengths = Lengths { least: direct + 1, most: settings.max_depth };
+        let target = Target::Path { least: lengths.least, most: lengths.most };
+        Self {
+            seed: settings.seed,
+            direct: Path::up_to(settings, direct),
+            lengths,
+            size: scene.camera.size,
+            mean: Mean::default(),
+            batches: 0,
+            lanes: (0..LANES).map(|_| Lane::new(settings.mutations.path_space, target)).collect(),
+        }
+    }
+
+    /// Draws a batch of independent samples, and starts the chains if there are none and some sample finds light.
+    fn sample(&mut self, scene: &Scene, samples: usize) -> u64 {
+        let (seed, batch, lengths) = (self.seed, self.batches, self.lengths);
+        let stream = |sample: usize| Stream::new(seed, &[2, 0, batch, sample as u64]);
+        let memory = || (FullPath::default(), Health::default());
+        let targets = independent(scene, samples, memory, |caster, (path, health), sample| {
+            lengths.sample(caster, &mut stream(sample), path, health).map_or(0.0, |found| found.luminance)
+        });
+        self.batches += 1;
+        targets.iter().for_each(|target| self.mean.add(*target));
+        if self.lanes.iter().any(|lane| lane.chain.is_some()) {
+            return samples as u64;
+        }
+        let Some(choice) = Discrete::new(&targets) else { return samples as u64 };
+        let caster = Caster::new(scene);
+        for (number, lane) in self.lanes.iter_mut().enumerate() {
+            let mut own = Stream::new(seed, &[3, 0, number as u64]);
+            let (chosen, _) = choice.sample(own.number());
+            lane.start(&caster, lengths, &mut stream(chosen), own);
+        }
+        samples as u64
+    }
+
+    pub(super) fn pass(&mut self, scene: &Scene, film: &mut Film, pass: u64, counts: &mut Counts) {
+        self.direct.pass(scene, film, pass, counts);
+        if self.lengths.count() == 0 {
+            return;
+        }
+        let pixels = self.size[0] * self.size[1];
+        let samples = if self.mean.sum == 0.0 { batch_samples(self.size, self.batches) } else { pixels / REFINEMENT };
+        let samples = self.sample(scene, samples);
+        let mutations = if self.mean.sum > 0.0 { pixels as u64 } else { 0 };
+        let (kernel, size, worth) = (film.kernel.clone(), film.size, self.mean.mean());
+        let run = |(number, lane): (usize, &mut Lane)| {
+            lane.run(&Caster::new(scene), share(mutations, number, pass), worth, &kernel, size)
+        };
+        let jobs: Vec<Job> = self.lanes.par_iter_mut().enumerate().map(run).collect();
+        jobs.iter().for_each(|job| film.report(&job.health));
+        counts.add(mutations + samples, jobs.iter().map(|job| job.rays).sum());
+        let splats: Vec<Splats> = jobs.into_iter().map(|job| job.splats).collect();
+        film.splat(&splats);
+        self.report(counts);
+    }
+
+    fn report(&self, counts: &mut Counts) {
+        let chains = || self.lanes.iter().filter_map(|lane| lane.chain.as_ref());
+        for kind in Kind::ALL {
+            let sum = |i: usize| chains().map(|chain| chain.tallies[kind as usize][i]).sum();
+            counts.acceptance.insert(kind.name(), vec![Acceptance { length: 0, proposed: sum(0), accepted: sum(1) }]);
+        }
+        let (mean, standard_error) = (self.mean.mean(), self.mean.error());
+        counts.chains =
+            vec![ChainReport { length: 0, mean, standard_error, chains: chains().count(), failed_inversions: 0 }];
+        counts.rejections.clear();
+        for (cause, count) in chains().flat_map(|chain| &chain.rejections) {
+            *counts.rejections.entry(cause.name()).or_default() += count;
+        }
+    }
+}
+
+impl Lane {
+    fn new(mutations: PathMutations, target: Target) -> Self {
+        let mutations = PathSpace::new(mutations, target);
+        Self { chain: None, mutations, proposal: FullPath::default(), health: Health::default() }
+    }
+
+    /// Begins at the sample that `draws` gives.
+    fn start(&mut self, scene: &Caster<'_>, lengths: Lengths, draws: &mut Stream, stream: Stream) {
+        let mut path = FullPath::default();
+        let Some(found) = lengths.sample(scene, draws, &mut path, &mut self.health) else { return };
+        // Without the weight that its technique has among others.
+        let (light, camera) = (&path.light.vertices, &path.camera.vertices);
+        let Some(alone) = connect_visible(scene, light, camera, &Techniques::ALONE) else { return };
+        let current = Found { value: alone.value, luminance: alone.value.luminance(), ..found };
+        let (tallies, rejections) = (Default::default(), BTreeMap::new());
+        self.chain = Some(Chain { stream, current, path, weight: 0.0, tallies, rejections });
+    }
+
+    fn run(&mut self, scene: &Caster<'_>, mutations: u64, worth: f64, kernel: &Kernel, size: [usize; 2]) -> Job {
+        let mut splats = Splats::new(size);
+        if let Some(mut chain) = self.chain.take() {
+            let mut splat = |found: &Found, weight: f64| {
+                if weight > 0.0 {
+                    splats.add(kernel, found.film, found.class, found.value * (weight * worth / found.luminance));
+                }
+            };
+            for _ in 0..mutations {
+                self.mutate(scene, &mut chain, &mut splat);
+            }
+            splat(&chain.current, std::mem::take(&mut chain.weight));
+            self.chain = Some(chain);
+        }
+        Job { splats, rays: scene.rays(), health: std::mem::take(&mut self.health) }
+    }
+
+    /// One mutation; both states count with their expected weight.
+    fn mutate(&mut self, scene: &Caster<'_>, chain: &mut Chain, splat: &mut impl FnMut(&Found, f64)) {
+        let Self { mutations, proposal, health, .. } = self;
+        let Chain { stream, path, current, .. } = chain;
+        let Proposed { kind, outcome } = mutations.propose(scene, (path, current), stream, proposal, health);
+        let acceptance = outcome.map_or(0.0, |(_, ratio)| ratio.min(1.0));
+        chain.weight += 1.0 - acceptance;
+        let accepted = chain.stream.number() < acceptance;
+        if let Some(kind) = kind {
+            let [proposals, successes] = &mut chain.tallies[kind as usize];
+            *proposals += 1;
+            *successes += u64::from(accepted);
+        }
+        match outcome {
+            Err(cause) => *chain.rejections.entry(cause).or_default() += 1,
+            Ok((found, _)) if accepted => {
+                splat(&chain.current, std::mem::replace(&mut chain.weight, acceptance));
+                chain.current = found;
+                std::mem::swap(&mut chain.path, proposal);
+            }
+            Ok((found, _)) => splat(&found, acceptance),
+        }
+    }
+}

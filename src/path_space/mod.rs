@@ -1,0 +1,357 @@
+//! Mutations in path space (Veach and Guibas 1997; Jakob and Marschner 2012): they move the vertices of a path, and may keep
+//! most of it as it is.
+//!
+//! # The measure
+//! The vertices that scatter by no delta lobe are where they are, each with its area as measure; the others follow from
+//! these, as the light's laws say. Between two free vertices a and b with delta vertices between, the contribution f holds
+//! the generalised geometric term instead of the plain one, with dω_a / dA_b along the chain ([`Chain::spread`]). A walk that
+//! passes the chain from a to b has the same factor in its density, where f and the density T of a mutation both have it
+//! nothing of it is left, and the product of cos θ / d² over the edges, which [`FullPath::density`] takes instead, does as
+//! well. Only where f has been found by a walk that passes a chain the other way round than the mutation does, or where the
+//! mutation has not traced the chain but walked there on its manifold, the factor
+//!
+//! ```text
+//! Γ(a → b) = dω_a / dA_b  /  Π cos θ_{i+1} / d²
+//! ```
+//!
+//! is left over ([`gamma`]).
+//!
+//! # The acceptance
+//! With C(x) = w_s f / p_s as the technique (s, t) finds it, Thesis ch. 6, eq. 6.24, is
+//!
+//! ```text
+//! a(x → y) = w_s(y) f(y) T(y → x) / (w_s(x) f(x) T(x → y)) = C(y) p_s(y) T(y → x) / (C(x) p_s(x) T(x → y)),
+//! ```
+//!
+//! where all weights are one for a chain that has no techniques.
+//!
+//! A mutation is drawn evenly among those that suit the path, so that T has their number, too. Perturbations keep which
+//! vertices scatter by delta lobes and how; both ways have the same choice. Only [`bidirectional`] changes them.
+//!
+//! [`Chain::spread`]: crate::manifold::Chain::spread
+//! [`FullPath::density`]: crate::paths::FullPath::density
+
+mod bidirectional;
+mod caustic;
+mod gamma;
+mod lens;
+mod link;
+mod manifold;
+mod multi_chain;
+mod perturb;
+mod retrace;
+mod steps;
+
+pub use bidirectional::Lengths;
+pub use steps::Radii;
+
+use crate::film::Health;
+use crate::manifold::Rejection;
+use crate::markov::{Found, TECHNIQUES};
+use crate::math::{Stream, Walk};
+use crate::paths::{Course, FullPath, Techniques, connect_visible};
+use crate::scene::Caster;
+use serde::{Deserialize, Serialize};
+
+/// The mutations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// Part of the path is sampled anew.
+    Bidirectional,
+    /// The film position moves.
+    Lens,
+    /// The last part of a caustic moves.
+    Caustic,
+    /// The film position moves, and directions further on.
+    MultiChain,
+    /// A vertex moves, and a chain follows.
+    Manifold,
+}
+
+impl Kind {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Bidirectional, Self::Lens, Self::Caustic, Self::MultiChain, Self::Manifold];
+
+    /// The name, as reports have it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Bidirectional => "bidirectional",
+            Self::Lens => "lens_perturbation",
+            Self::Caustic => "caustic_perturbation",
+            Self::MultiChain => "multi_chain_perturbation",
+            Self::Manifold => "manifold_perturbation",
+        }
+    }
+}
+
+/// Some of the mutations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "Vec<Kind>", from = "Vec<Kind>")]
+pub struct Kinds([bool; Kind::ALL.len()]);
+
+impl Kinds {
+    /// Whether `kind` is one of them.
+    pub const fn has(self, kind: Kind) -> bool {
+        self.0[kind as usize]
+    }
+}
+
+impl From<Vec<Kind>> for Kinds {
+    fn from(kinds: Vec<Kind>) -> Self {
+        Self(Kind::ALL.map(|kind| kinds.contains(&kind)))
+    }
+}
+
+impl From<Kinds> for Vec<Kind> {
+    fn from(kinds: Kinds) -> Self {
+        Kind::ALL.into_iter().filter(|kind| kinds.has(*kind)).collect()
+    }
+}
+
+/// Which mutations there are, and how far they go.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PathMutations {
+    /// Those that may be drawn.
+    pub kinds: Kinds,
+    /// How far directions move, in radians.
+    pub angles: Radii,
+}
+
+impl Default for PathMutations {
+    fn default() -> Self {
+        Self { kinds: Kinds([true; Kind::ALL.len()]), angles: Radii { least: 1e-4, most: 0.1 } }
+    }
+}
+
+/// What a chain's target is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// w_s f of paths of one length, times the number of techniques, with a technique that stays.
+    Technique,
+    /// f of paths of these lengths, in edges.
+    Path {
+        /// The shortest.
+        least: usize,
+        /// The longest.
+        most: usize,
+    },
+}
+
+impl Target {
+    const fn techniques(self) -> Techniques {
+        match self {
+            Self::Technique => TECHNIQUES,
+            Self::Path { .. } => Techniques::ALONE,
+        }
+    }
+}
+
+/// Where a perturbation begins, and how far it goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Plan {
+    /// The vertex that the path leaves in another direction.
+    from: usize,
+    /// The walk that goes that way.
+    walk: Walk,
+    /// Free vertices that move.
+    stops: usize,
+}
+
+/// What a mutation has made of a path, before anything is known of its contribution.
+struct Draft {
+    /// Light vertices of a technique that finds it.
+    technique: usize,
+    /// T(y → x) / T(x → y), without what `ranges` stand for.
+    ratio: f64,
+    /// For paths that were sampled anew: the techniques that would sample the same, of the old path and of the new one.
+    ranges: Option<[bidirectional::Range; 2]>,
+}
+
+/// A proposal.
+#[derive(Clone, Copy, Debug)]
+pub struct Proposed {
+    /// The mutation; `None` where none suits the path.
+    pub kind: Option<Kind>,
+    /// The path that is proposed, with the acceptance; or why there is none.
+    pub outcome: Result<(Found, f64), Rejection>,
+}
+
+/// Mutations in path space, with their memory.
+#[derive(Debug)]
+pub struct PathSpace {
+    mutations: PathMutations,
+    target: Target,
+    old: Course,
+    new: Course,
+    plans: Vec<Plan>,
+    densities: Vec<f64>,
+}
+
+impl PathSpace {
+    /// No path is known yet.
+    pub fn new(mutations: PathMutations, target: Target) -> Self {
+        let (old, new) = (Course::default(), Course::default());
+        Self { mutations, target, old, new, plans: Vec::new(), densities: Vec::new() }
+    }
+
+    /// Mutates `path`, which contributes `current`; the new path is left in `proposal`.
+    pub fn propose(
+        &mut self,
+        scene: &Caster<'_>,
+        (path, current): (&FullPath, &Found),
+        stream: &mut Stream,
+        proposal: &mut FullPath,
+        health: &mut Health,
+    ) -> Proposed {
+        if !self.old.follow(path) {
+            return Proposed { kind: None, outcome: Err(Rejection::Unsuitable) };
+        }
+        let suitable = self.suitable(scene, Which::Old);
+        let number = (stream.number() * suitable.len() as f64) as usize;
+        let Some(&kind) = suitable.get(number) else {
+            return Proposed { kind: None, outcome: Err(Rejection::Unsuitable) };
+        };
+        let outcome = self.mutate(kind, scene, path, stream).and_then(|draft| {
+            let found = self.judge(scene, &draft, (path, current), proposal, health).ok_or(Rejection::Dark)?;
+            let choice = match kind {
+                Kind::Bidirectional => suitable.len() as f64 / self.suitable(scene, Which::New).len() as f64,
+                _ => 1.0,
+            };
+            Ok((found.0, found.1 * choice))
+        });
+        Proposed { kind: Some(kind), outcome }
+    }
+
+    /// The mutations that suit a course.
+    fn suitable(&mut self, scene: &Caster<'_>, which: Which) -> arrayvec::ArrayVec<Kind, 5> {
+        let course = if which == Which::Old { &self.old } else { &self.new };
+        let plans = &mut self.plans;
+        let suits = |kind: &Kind| {
+            plans.clear();
+            self.mutations.kinds.has(*kind)
+                && (*kind == Kind::Bidirectional || {
+                    plan(*kind, scene, course, plans);
+                    !plans.is_empty()
+                })
+        };
+        Kind::ALL.into_iter().filter(suits).collect()
+    }
+
+    /// Draws a new course.
+    fn mutate(
+        &mut self,
+        kind: Kind,
+        scene: &Caster<'_>,
+        path: &FullPath,
+        stream: &mut Stream,
+    ) -> Result<Draft, Rejection> {
+        let Self { old, new, plans, .. } = self;
+        let technique = path.light.vertices.len();
+        if kind == Kind::Bidirectional {
+            let lengths = match self.target {
+                Target::Technique => Lengths::Same,
+                Target::Path { least, most } => Lengths::Between { least, most },
+            };
+            let mut draft = bidirectional::propose(scene, old, lengths, stream, new).ok_or(Rejection::Dark)?;
+            if self.target == Target::Technique {
+                draft.technique = technique;
+            }
+            return Ok(draft);
+        }
+        plans.clear();
+        plan(kind, scene, old, plans);
+        let number = (stream.number() * plans.len() as f64) as usize;
+        let plan = plans.get(number).ok_or(Rejection::Unsuitable)?;
+        let ratio = perturb::propose(scene, old, technique, plan, self.mutations.angles, stream, new)?;
+        Ok(Draft { technique, ratio, ranges: None })
+    }
+
+    /// What the new course contributes, and the acceptance; `None` where it carries no light.
+    fn judge(
+        &mut self,
+        scene: &Caster<'_>,
+        draft: &Draft,
+        (path, current): (&FullPath, &Found),
+        proposal: &mut FullPath,
+        health: &mut Health,
+    ) -> Option<(Found, f64)> {
+        let Self { new, densities, target, .. } = self;
+        proposal.assemble(scene, new, draft.technique)?;
+        let (light, camera) = (&proposal.light.vertices, &proposal.camera.vertices);
+        let connection = connect_visible(scene, light, camera, &target.techniques())?;
+        let count = if *target == Target::Technique { (new.edges() + 1) as f64 } else { 1.0 };
+        let value = connection.value * count;
+        let luminance = value.luminance();
+        if !(health.accepts(value) && luminance > 0.0) {
+            return None;
+        }
+        proposal.film = connection.film.unwrap_or(proposal.film);
+        new.film = proposal.film;
+        proposal.junction = connection.junction;
+        let (film, technique) = (proposal.film, draft.technique);
+        let found = Found { value, luminance, class: connection.class, film, technique };
+        // The density of both paths, as far as T leaves something of it.
+        let mut density = |path: &FullPath, which: usize| match draft.ranges {
+            None => path.density(),
+            Some(ranges) => {
+                path.densities(densities);
+                1.0 / densities[ranges[which].techniques()].iter().sum::<f64>()
+            }
+        };
+        let ratio = luminance / current.luminance * density(proposal, 1) / density(path, 0) * draft.ratio;
+        // Neither infinite nor NaN: a path whose density is none at all was not found by this technique.
+        (ratio.is_finite()).then_some((found, ratio))
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Which {
+    Old,
+    New,
+}
+
+/// Adds the ways in which a perturbation may move a path.
+fn plan(kind: Kind, scene: &Caster<'_>, course: &Course, plans: &mut Vec<Plan>) {
+    match kind {
+        Kind::Bidirectional => {}
+        Kind::Lens => plans.extend(lens::plan(course)),
+        Kind::Caustic => plans.extend(caustic::plan(course)),
+        Kind::MultiChain => plans.extend(multi_chain::plan(course)),
+        Kind::Manifold => manifold::plans(scene, course, plans),
+    }
+}
+
+/// The next free vertex from x_m on, as `walk` goes; `None` where the path ends.
+fn next_free(course: &Course, m: usize, walk: Walk) -> Option<usize> {
+    let mut at = onward(course, m, walk)?;
+    while course.nodes[at].delta {
+        at = onward(course, at, walk)?;
+    }
+    Some(at)
+}
+
+/// The next vertex.
+fn onward(course: &Course, m: usize, walk: Walk) -> Option<usize> {
+    match walk {
+        Walk::FromCamera => m.checked_sub(1),
+        Walk::FromLight => (m < course.edges()).then_some(m + 1),
+    }
+}
+
+/// Unit vector from x_m to the next vertex.
+fn direction_onward(scene: &Caster<'_>, course: &Course, m: usize, walk: Walk) -> Option<glam::DVec3> {
+    match walk {
+        Walk::FromCamera => Some(-course.direction(scene, m.checked_sub(1)?)?),
+        Walk::FromLight => course.direction(scene, m),
+    }
+}
+
+/// The other way round.
+const fn reverse(walk: Walk) -> Walk {
+    match walk {
+        Walk::FromCamera => Walk::FromLight,
+        Walk::FromLight => Walk::FromCamera,
+    }
+}
