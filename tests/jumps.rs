@@ -4,9 +4,9 @@
 
 use pathblend::film::Health;
 use pathblend::load::{Options, read};
-use pathblend::markov::{ChainState, Found, Jump, JumpMemory, Mutations, Tracer, jump};
+use pathblend::markov::{ChainState, Jump, JumpMemory, Mutations, Tracer, jump};
 use pathblend::math::{Stream, Walk};
-use pathblend::paths::FullPath;
+use pathblend::paths::{Found, FullPath};
 use pathblend::scene::{Caster, Scene};
 use rayon::prelude::*;
 use std::path::Path;

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 /// The rooms, lowest first. Rooms on one line may use each other's types only downwards in the order given.
-const ROOMS: [&str; 21] = [
+const ROOMS: [&str; 22] = [
     "math",
     "spectrum",
     "forest",
@@ -20,8 +20,9 @@ const ROOMS: [&str; 21] = [
     "scene",
     "load",
     "import",
-    "manifold",
     "paths",
+    "manifold",
+    "path_space",
     "markov",
     "integrators",
     "blend",

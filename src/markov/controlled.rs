@@ -15,13 +15,13 @@
 //! chance only. It is the γ with which the inverse gives just u_i at x_i ([`remainder`]), and goes along to y_i. So the map
 //! from u_i to u'_i is one to one, and nothing is drawn for it.
 
-use super::found::{Found, Tracer};
 use super::settings::Scales;
 use super::small_step::SmallStep;
 use super::state::ChainState;
+use super::tracer::Tracer;
 use crate::film::Health;
 use crate::math::{Row, Stream, Walk};
-use crate::paths::{Event, FullPath, Rows};
+use crate::paths::{Event, Found, FullPath, Rows};
 use crate::scene::{Caster, Scene, Surface};
 use glam::DVec3;
 

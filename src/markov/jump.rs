@@ -14,10 +14,10 @@
 //! its interval instead would be a mistake. Rows that are no longer read are forgotten: a jump back sets them before they
 //! are read again, but large steps that try all techniques read them, and must find them free of the path.
 
-use super::found::{Found, TECHNIQUES, Tracer};
 use super::state::ChainState;
+use super::tracer::Tracer;
 use crate::math::{Row, Stream, pick};
-use crate::paths::{FullPath, Heuristic};
+use crate::paths::{Found, FullPath, Heuristic, TECHNIQUES};
 use crate::scene::Scene;
 
 /// How a jump has ended.

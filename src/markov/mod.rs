@@ -11,17 +11,17 @@
 //! whose mean over techniques and rows is b_k, the mean luminance of the image of length k (Bitterli et al. 2017, eq. 4).
 
 mod controlled;
-mod found;
 mod jump;
 mod settings;
 mod small_step;
 mod state;
+mod tracer;
 mod tries;
 
 pub use controlled::{ControlledMemory, controlled_step, remainder};
-pub use found::{Found, TECHNIQUES, Tracer};
 pub use jump::{Jump, JumpMemory, jump, retell};
 pub use settings::{FilmSteps, Jumps, LargeSteps, Mutations, MutationsError, Scales};
 pub use small_step::SmallStep;
 pub use state::{ChainState, Proposal};
+pub use tracer::Tracer;
 pub use tries::Tries;

@@ -8,11 +8,11 @@
 //! min(1, Σ_s C_s(u) / Σ_s C_s(u')).
 //! ```
 
-use super::found::{Found, TECHNIQUES, Tracer};
 use super::state::ChainState;
+use super::tracer::Tracer;
 use crate::film::Health;
 use crate::math::{Stream, pick};
-use crate::paths::{FullPath, Junction, connect};
+use crate::paths::{Found, FullPath, Junction, TECHNIQUES, connect};
 use crate::scene::Caster;
 
 /// The connections of two full walks.

@@ -47,9 +47,8 @@ pub use steps::Radii;
 
 use crate::film::Health;
 use crate::manifold::Rejection;
-use crate::markov::{Found, TECHNIQUES};
 use crate::math::{Stream, Walk};
-use crate::paths::{Course, FullPath, Techniques, connect_visible};
+use crate::paths::{Course, Found, FullPath, TECHNIQUES, Techniques, connect_visible};
 use crate::scene::Caster;
 use serde::{Deserialize, Serialize};
 

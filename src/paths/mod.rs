@@ -7,6 +7,7 @@
 mod connect;
 mod course;
 mod direct;
+mod found;
 mod full;
 mod merge;
 mod mis;
@@ -17,6 +18,7 @@ mod trace;
 pub use connect::{Connection, connect, connect_visible};
 pub use course::{Course, Node};
 pub use direct::{Direct, direct_pdf, sample_direct};
+pub use found::{Found, TECHNIQUES};
 pub use full::{Event, FullPath};
 pub use merge::merge;
 pub use mis::{Heuristic, Junction, Techniques};

@@ -4,12 +4,11 @@ use super::super::chains::Mean;
 use super::{Family, Share};
 use crate::film::{Health, Kernel, Splats};
 use crate::markov::{
-    ChainState, ControlledMemory, Found, Jump, JumpMemory, Jumps, Mutations, Tracer, Tries, controlled_step, jump,
-    retell,
+    ChainState, ControlledMemory, Jump, JumpMemory, Jumps, Mutations, Tracer, Tries, controlled_step, jump, retell,
 };
 use crate::math::Stream;
 use crate::path_space::{Kind, PathSpace, Proposed, Target};
-use crate::paths::FullPath;
+use crate::paths::{Found, FullPath};
 use crate::scene::{Caster, Scene};
 use std::collections::BTreeMap;
 

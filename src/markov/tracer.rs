@@ -1,33 +1,13 @@
-//! From a state to its path.
+//! From rows to a path.
 
 use super::state::ChainState;
-use crate::film::{Health, PathClass};
+use crate::film::Health;
 use crate::math::{Row, Stream};
-use crate::paths::{FullPath, Heuristic, Rows, Techniques, connect, trace_camera, trace_light};
+use crate::paths::{Found, FullPath, Rows, TECHNIQUES, connect, trace_camera, trace_light};
 use crate::scene::Caster;
-use crate::spectrum::Spectrum;
-use glam::DVec2;
-
-/// The primary samples of a path do not know where its light is to arrive: lights are chosen by power.
-pub const TECHNIQUES: Techniques = Techniques::connections(Heuristic::Power);
 
 /// No vertex is the last by chance.
 const NEVER: usize = usize::MAX;
-
-/// A path as the film and the chain see it.
-#[derive(Clone, Copy, Debug)]
-pub struct Found {
-    /// Weighted contribution over density, times the number of techniques.
-    pub value: Spectrum,
-    /// Luminance of `value`: the chain's target.
-    pub luminance: f64,
-    /// Its class.
-    pub class: PathClass,
-    /// Film position.
-    pub film: DVec2,
-    /// Light vertices of the technique.
-    pub technique: usize,
-}
 
 /// Fresh random numbers, for walks that do not end at random.
 struct Fresh<'a>(&'a mut Stream);
