@@ -46,7 +46,7 @@ fn render(folder: &Path, method: &str, out: &str, more: &[&str]) -> Value {
 #[test]
 fn render_prints_the_published_names() {
     let folder = tempfile::tempdir().unwrap();
-    for method in ["path", "bdpt", "sppm", "pssmlt", "mmlt", "rjmlt"] {
+    for method in ["path", "bdpt", "sppm", "pssmlt", "mmlt", "rjmlt", "mlt", "fused"] {
         let summary = render(folder.path(), method, "a.exr", &["--passes", "2", "--seed", "3"]);
         for name in ["integrator", "seed", "wall_s", "cpu_s", "samples", "rays", "passes", "health"] {
             assert!(summary.get(name).is_some(), "{name} is missing: {summary}");
@@ -232,7 +232,7 @@ fn a_camera_inside_a_wall_sees_nothing() {
         <shape type='sphere'><point name='center' x='5' y='0' z='0'/><emitter type='area'>\
         <rgb name='radiance' value='1'/></emitter></shape></scene>";
     fs::write(path.join("inside.xml"), text).unwrap();
-    for method in ["path", "bdpt", "sppm", "pssmlt", "mmlt", "rjmlt"] {
+    for method in ["path", "bdpt", "sppm", "pssmlt", "mmlt", "rjmlt", "mlt", "fused"] {
         pathblend()
             .current_dir(path)
             .args(["render", "inside.xml", "-i", method, "--passes", "2", "-o", "x.exr"])

@@ -119,7 +119,7 @@ fn chains_without_any_path_end() {
         <shape type='sphere'><point name='center' x='0' y='0' z='4'/><bsdf type='conductor'/></shape>\
         <emitter type='point'><point name='position' x='0' y='3' z='0'/></emitter></scene>";
     fs::write(folder.path().join("mirror.xml"), text).unwrap();
-    for method in ["pssmlt", "mmlt", "rjmlt"] {
+    for method in ["pssmlt", "mmlt", "rjmlt", "mlt", "fused"] {
         for more in [&["--direct", "chains"][..], &["--tries-from", "2"], &["--controlled-steps"]] {
             let arguments = ["render", "mirror.xml", "-i", method, "--passes", "3", "-o", "x.exr"];
             let (success, _, message) = pathblend(folder.path(), &[&arguments, more].concat());

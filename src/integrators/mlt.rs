@@ -200,9 +200,9 @@ impl Lane {
 
     /// One mutation; both states count with their expected weight.
     fn mutate(&mut self, scene: &Caster<'_>, chain: &mut Chain, splat: &mut impl FnMut(&Found, f64)) {
-        let Self { mutations, proposal, health, .. } = self;
+        let Self { mutations, proposal, .. } = self;
         let Chain { stream, path, current, .. } = chain;
-        let Proposed { kind, outcome } = mutations.propose(scene, (path, current), stream, proposal, health);
+        let Proposed { kind, outcome } = mutations.propose(scene, (path, current), stream, proposal);
         let acceptance = outcome.map_or(0.0, |(_, ratio)| ratio.min(1.0));
         chain.weight += 1.0 - acceptance;
         let accepted = chain.stream.number() < acceptance;

@@ -45,7 +45,6 @@ mod steps;
 pub use bidirectional::Lengths;
 pub use steps::Radii;
 
-use crate::film::Health;
 use crate::manifold::Rejection;
 use crate::math::{Stream, Walk};
 use crate::paths::{Course, Found, FullPath, TECHNIQUES, Techniques, connect_visible};
@@ -202,7 +201,6 @@ impl PathSpace {
         (path, current): (&FullPath, &Found),
         stream: &mut Stream,
         proposal: &mut FullPath,
-        health: &mut Health,
     ) -> Proposed {
         if !self.old.follow(path) {
             return Proposed { kind: None, outcome: Err(Rejection::Unsuitable) };
@@ -213,7 +211,7 @@ impl PathSpace {
             return Proposed { kind: None, outcome: Err(Rejection::Unsuitable) };
         };
         let outcome = self.mutate(kind, scene, path, stream).and_then(|draft| {
-            let found = self.judge(scene, &draft, (path, current), proposal, health).ok_or(Rejection::Dark)?;
+            let found = self.judge(scene, &draft, (path, current), proposal).ok_or(Rejection::Dark)?;
             let choice = match kind {
                 Kind::Bidirectional => suitable.len() as f64 / self.suitable(scene, Which::New).len() as f64,
                 _ => 1.0,
@@ -274,7 +272,6 @@ impl PathSpace {
         draft: &Draft,
         (path, current): (&FullPath, &Found),
         proposal: &mut FullPath,
-        health: &mut Health,
     ) -> Option<(Found, f64)> {
         let Self { new, densities, target, .. } = self;
         proposal.assemble(scene, new, draft.technique)?;
@@ -283,7 +280,8 @@ impl PathSpace {
         let count = if *target == Target::Technique { (new.edges() + 1) as f64 } else { 1.0 };
         let value = connection.value * count;
         let luminance = value.luminance();
-        if !(health.accepts(value) && luminance > 0.0) {
+        // Of a path that a technique can hardly find the contribution may be beyond numbers: it is no proposal.
+        if !(value.is_valid() && luminance > 0.0) {
             return None;
         }
         proposal.film = connection.film.unwrap_or(proposal.film);

@@ -1,6 +1,7 @@
 //! Tables of an experiment, as Markdown.
 
 use super::{Experiment, Run};
+use crate::path_space::Kind;
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -28,8 +29,13 @@ impl Experiment {
 
     /// The mean squared errors of a variant on a scene after a time.
     pub(super) fn errors(&self, scene: &str, variant: &str, time: f64) -> Spread {
+        self.spread(scene, variant, time, |run| run.mse)
+    }
+
+    /// An error of a variant on a scene after a time.
+    fn spread(&self, scene: &str, variant: &str, time: f64, error: fn(&Run) -> f64) -> Spread {
         let is_of = |run: &&Run| run.scene == scene && run.variant == variant && run.time == time;
-        Spread::of(&self.runs.iter().filter(is_of).map(|run| run.mse).collect::<Vec<_>>())
+        Spread::of(&self.runs.iter().filter(is_of).map(error).collect::<Vec<_>>())
     }
 
     /// Accepted over proposed of a kind of mutation, summed over runs, by length.
@@ -45,7 +51,7 @@ impl Experiment {
         sums
     }
 
-    fn write_errors(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn write_errors(&self, f: &mut fmt::Formatter<'_>, error: fn(&Run) -> f64) -> fmt::Result {
         write!(f, "| scene | seconds |")?;
         self.recipe.variants.iter().try_for_each(|variant| write!(f, " {} |", variant.name))?;
         writeln!(f, "\n|---|---|{}", "---|".repeat(self.recipe.variants.len()))?;
@@ -53,7 +59,7 @@ impl Experiment {
             for time in &self.recipe.times {
                 write!(f, "| {scene} | {time} |")?;
                 for variant in &self.recipe.variants {
-                    let Spread { mean, deviation } = self.errors(&scene, &variant.name, *time);
+                    let Spread { mean, deviation } = self.spread(&scene, &variant.name, *time, error);
                     write!(f, " {mean:.3e} ± {deviation:.1e} |")?;
                 }
                 writeln!(f)?;
@@ -112,8 +118,11 @@ impl Experiment {
 impl fmt::Display for Experiment {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "Mean squared error, mean ± standard deviation of {} runs:\n", self.recipe.seeds)?;
-        self.write_errors(f)?;
-        ["large_step", "small_step", "technique_change"].iter().try_for_each(|kind| self.write_acceptance(f, kind))?;
+        self.write_errors(f, |run| run.mse)?;
+        writeln!(f, "\nThe same of the relative squared error:\n")?;
+        self.write_errors(f, |run| run.relmse)?;
+        let kinds = ["large_step", "small_step", "technique_change"].into_iter();
+        kinds.chain(Kind::ALL.map(Kind::name)).try_for_each(|kind| self.write_acceptance(f, kind))?;
         self.write_speed(f)
     }
 }

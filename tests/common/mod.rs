@@ -13,8 +13,17 @@ use pathblend::math::Frame;
 use pathblend::scene::{Builder, FilmSpec, Mesh, Scene};
 use pathblend::spectrum::Spectrum;
 
-pub const METHODS: [Method; 7] =
-    [Method::Path, Method::Bdpt, Method::Sppm, Method::Vcm, Method::Pssmlt, Method::Mmlt, Method::Rjmlt];
+pub const METHODS: [Method; 9] = [
+    Method::Path,
+    Method::Bdpt,
+    Method::Sppm,
+    Method::Vcm,
+    Method::Pssmlt,
+    Method::Mmlt,
+    Method::Rjmlt,
+    Method::Mlt,
+    Method::Fused,
+];
 
 /// Runs of one method on one scene, each with its own seed.
 pub const SEEDS: u64 = 32;

@@ -247,7 +247,7 @@ impl Lane {
         let Chain { state, stream, current, path, rejections, .. } = chain;
         let Work { scene, tracer, .. } = *work;
         let Self { path_space, proposal, returned, health, .. } = self;
-        let Proposed { kind, outcome } = path_space.propose(scene, (path, current), stream, proposal, health);
+        let Proposed { kind, outcome } = path_space.propose(scene, (path, current), stream, proposal);
         let Some(kind) = kind else {
             chain.weight += 1.0;
             return;
