@@ -42,14 +42,15 @@ fn example(scene: &Caster<'_>, links: usize, stream: &mut Stream) -> Option<(DVe
             Some(index) => Turn::Refracted { eta: 1.0 / index },
             None => Turn::Reflected,
         };
-        direction = turn.onward(&surface, -direction)?;
+        direction = turn.onward(surface.frame.normal, -direction)?;
         origin = surface.leave(direction);
         surfaces.push(surface);
     }
     let end = surfaces.last()?.position + direction * 1.5;
     let Frame { tangent, bitangent, .. } = Frame::around(direction);
     let aside = (tangent * (stream.number() - 0.5) + bitangent * (stream.number() - 0.5)) * 0.1;
-    Some((start, Chain::new(scene, start, &surfaces, end).ok()?, Goal::new(end + aside, [tangent, bitangent])))
+    let deltas: Vec<(Surface, bool)> = surfaces.iter().map(|surface| (*surface, true)).collect();
+    Some((start, Chain::new(scene, start, &deltas, end).ok()?, Goal::new(end + aside, [tangent, bitangent])))
 }
 
 fn main() {

@@ -1,7 +1,7 @@
 //! What integrators ask of a model before they look at directions.
 
 use super::{Bsdf, Letter, flip};
-use crate::texture::{Number, Texture};
+use crate::texture::{Number, Site, Texture};
 use glam::DVec3;
 
 impl Bsdf {
@@ -112,6 +112,18 @@ impl Bsdf {
             | Self::Principled(_)
             | Self::Coating(_)
             | Self::TwoSided(_) => None,
+        }
+    }
+
+    /// Roughness α, the smaller one, of a model that has one microfacet lobe and nothing else, as `met` meets it; a mirror
+    /// but for a blur.
+    pub fn gloss(&self, site: &Site, met: DVec3) -> Option<f64> {
+        match self {
+            Self::RoughConductor(rough) => Some(rough.roughness.at(site).alpha.min_element()),
+            Self::RoughDielectric(rough) => Some(rough.roughness.at(site).alpha.min_element()),
+            Self::TwoSided(sides) => sides[usize::from(met.z < 0.0)].gloss(site, met),
+            Self::Turned(bsdf) => bsdf.gloss(site, met),
+            _ => None,
         }
     }
 

@@ -37,8 +37,11 @@ pub(super) struct MutationArguments {
     #[arg(long, value_name = "EDGES")]
     tries_from: Option<usize>,
     /// Share of the small steps in whose place paths move in path space: fused.
-    #[arg(long, value_name = "SHARE", default_value_t = 0.5, allow_negative_numbers = true)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.2, allow_negative_numbers = true)]
     path_step: f64,
+    /// Roughness below which vertices with nothing but a microfacet lobe move with their chain: mlt, fused.
+    #[arg(long, value_name = "ALPHA", default_value_t = 0.1, allow_negative_numbers = true)]
+    glossy_chains: f64,
     /// How paths move in path space: mlt, fused.
     #[arg(long, value_enum, value_name = "KINDS", value_delimiter = ',', default_values_t = Kind::ALL)]
     path_mutations: Vec<Kind>,
@@ -93,7 +96,11 @@ impl MutationArguments {
             controlled: self.controlled_steps,
             large_steps: self.tries_from.map_or(LargeSteps::Plain, LargeSteps::TriesFrom),
             separate_direct: self.direct == Direct::Separate,
-            path_space: PathMutations { kinds: self.path_mutations.clone().into(), ..PathMutations::default() },
+            path_space: PathMutations {
+                kinds: self.path_mutations.clone().into(),
+                glossy: self.glossy_chains,
+                ..PathMutations::default()
+            },
             path_step: self.path_step,
         }
         .checked()

@@ -1,8 +1,8 @@
 //! The law of a specular vertex, and its derivatives.
 //!
 //! Between unit vectors a back and b onward the half-vector is H = a + η b, with η = 1 for reflection; ĥ is its direction
-//! on the side of the normal n. What it is off the normal, c = ĥ − (ĥ·n) n, is zero on the manifold. The derivatives are
-//! those of c in a frame that stays as it is; where c is zero they are those in any frame that follows the normal.
+//! on the side of the normal n. What it is off the normal, c = ĥ − (ĥ·n) n, is zero on the manifold of delta vertices; a
+//! glossy vertex keeps its c, in the frame [`Frame::around`] the normal, which follows it (Jakob 2013, section 5.4.4).
 
 use super::Turn;
 use crate::math::Frame;
@@ -31,6 +31,13 @@ pub fn offset(before: DVec3, (here, turn): (&Patch, Turn), after: DVec3) -> Opti
     Some((half - here.normal * along) * 1f64.copysign(along))
 }
 
+/// Density of offsets by directions: how much [`offset`] moves, as an area in the frame around `normal`, when the unit vector
+/// `onward` does by a solid angle.
+pub fn offset_density(back: DVec3, (normal, turn): (DVec3, Turn), onward: DVec3) -> Option<f64> {
+    let (half, length) = half(back, turn, onward)?;
+    Some((turn.weight() / length).powi(2) * onward.dot(half).abs() * half.dot(normal).abs())
+}
+
 /// The half-vector's direction and its length.
 fn half(back: DVec3, turn: Turn, onward: DVec3) -> Option<(DVec3, f64)> {
     let half = back + onward * turn.weight();
@@ -57,7 +64,10 @@ pub fn derivatives(before: &Patch, (here, turn): (&Patch, Turn), after: &Patch) 
     };
     let own = |axis: usize| {
         let step = here.tangents[axis];
-        project(turned(-back_by(step) - onward_by(step))) - project(here.turning[axis]) * along.abs()
+        // The half-vector changes, and so does the frame.
+        let frame =
+            Frame::turning(here.normal, here.turning[axis]).map(|change| change.dot(half) * 1f64.copysign(along));
+        project(turned(-back_by(step) - onward_by(step))) + DVec2::from(frame)
     };
     Some(Derivatives {
         before: by_neighbour(before.tangents, &back_by),

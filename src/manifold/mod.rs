@@ -12,8 +12,8 @@
 mod constraint;
 mod walk;
 
-pub use constraint::{Derivatives, derivatives, offset, transfer};
-pub use walk::{Chain, Goal, MOST_LINKS, MOST_STEPS, Rejection};
+pub use constraint::{Derivatives, derivatives, offset, offset_density, transfer};
+pub use walk::{Chain, Goal, Link, MOST_LINKS, MOST_STEPS, Rejection};
 
 use crate::bsdf::fresnel;
 use crate::scene::{Scene, Surface};
@@ -51,9 +51,9 @@ impl Turn {
         }
     }
 
-    /// Where light goes on that comes from the unit vector `from`; `None` where it is reflected totally.
-    pub fn onward(self, surface: &Surface, from: DVec3) -> Option<DVec3> {
-        let normal = surface.frame.normal;
+    /// Where light goes on that comes from the unit vector `from` and meets a facet with this unit `normal`; `None` where it
+    /// is reflected totally.
+    pub fn onward(self, normal: DVec3, from: DVec3) -> Option<DVec3> {
         let cos = from.dot(normal);
         match self {
             Self::Reflected => Some(normal * (2.0 * cos) - from),

@@ -1,8 +1,9 @@
 //! Walks of a chain to a new end.
 
-use super::{Turn, derivatives, transfer};
+use super::{Turn, derivatives, offset, transfer};
+use crate::math::Frame;
 use crate::paths::Node;
-use crate::scene::{Caster, Patch, Surface};
+use crate::scene::{Caster, Patch, Scene, Surface};
 use arrayvec::ArrayVec;
 use glam::{DMat2, DVec2, DVec3};
 
@@ -70,9 +71,55 @@ impl Rejection {
     }
 }
 
-/// The specular vertices of a chain, and what each does.
+/// A vertex of a chain.
+#[derive(Clone, Copy, Debug)]
+pub struct Link {
+    /// Where it lies.
+    pub surface: Surface,
+    /// What it does.
+    pub turn: Turn,
+    /// How far the half-vector is off the normal, in the frame around it; zero at a delta vertex.
+    pub offset: DVec2,
+}
+
+impl Link {
+    /// The vertex at `surface` between two points; one that is no delta vertex keeps the half-vector that it has.
+    ///
+    /// # Errors
+    /// [`Rejection::Unsuitable`], [`Rejection::Singular`].
+    pub fn new(
+        scene: &Scene,
+        before: DVec3,
+        (surface, delta): (&Surface, bool),
+        after: DVec3,
+    ) -> Result<Self, Rejection> {
+        let [from, onward] = [before, after].map(|end| (end - surface.position).normalize());
+        let turn = Turn::at(scene, surface, from, onward).ok_or(Rejection::Unsuitable)?;
+        let mut link = Self { surface: *surface, turn, offset: DVec2::ZERO };
+        if !delta {
+            let patch = scene.patch(surface).ok_or(Rejection::Unsuitable)?;
+            let offset = offset(before, (&patch, turn), after).ok_or(Rejection::Singular)?;
+            link.offset = Frame::around(patch.normal).to_local(offset).truncate();
+        }
+        Ok(link)
+    }
+
+    /// Where light goes on that comes from the unit vector `from`, when the vertex lies on `surface` instead; `None` where
+    /// that is another turn, or on the wrong side of the true surface.
+    pub fn onward(&self, scene: &Scene, surface: &Surface, from: DVec3) -> Option<DVec3> {
+        let DVec2 { x, y } = self.offset;
+        let up = (1.0 - self.offset.length_squared()).max(0.0).sqrt();
+        let facet = Frame::around(surface.frame.normal).to_world(DVec3::new(x, y, up));
+        let onward = self.turn.onward(facet, from)?;
+        let passes = from.dot(surface.geometric) * onward.dot(surface.geometric) < 0.0;
+        let same = Turn::at(scene, surface, from, onward) == Some(self.turn);
+        (same && passes == (self.turn != Turn::Reflected)).then_some(onward)
+    }
+}
+
+/// The vertices of a chain.
 #[derive(Clone, Debug)]
-pub struct Chain(ArrayVec<(Surface, Turn), MOST_LINKS>);
+pub struct Chain(ArrayVec<Link, MOST_LINKS>);
 
 /// A chain with the unit vector in which light leaves its last vertex.
 struct Traced {
@@ -81,27 +128,32 @@ struct Traced {
 }
 
 impl Chain {
-    /// The vertices `surfaces` between `start` and `end`.
+    /// The vertices `surfaces` between `start` and `end`; those that are not delta vertices keep the half-vector that they
+    /// have.
     ///
     /// # Errors
     /// [`Rejection::TooLong`], [`Rejection::Unsuitable`].
-    pub fn new(scene: &Caster<'_>, start: DVec3, surfaces: &[Surface], end: DVec3) -> Result<Self, Rejection> {
+    pub fn new(scene: &Caster<'_>, start: DVec3, surfaces: &[(Surface, bool)], end: DVec3) -> Result<Self, Rejection> {
         let mut links = ArrayVec::new();
         if surfaces.len() > MOST_LINKS {
             return Err(Rejection::TooLong);
         }
-        for (i, surface) in surfaces.iter().enumerate() {
-            let before = if i == 0 { start } else { surfaces[i - 1].position };
-            let after = surfaces.get(i + 1).map_or(end, |next| next.position);
-            let [from, onward] = [before, after].map(|end| (end - surface.position).normalize());
-            links.push((*surface, Turn::at(scene, surface, from, onward).ok_or(Rejection::Unsuitable)?));
+        for (i, (surface, delta)) in surfaces.iter().enumerate() {
+            let before = if i == 0 { start } else { surfaces[i - 1].0.position };
+            let after = surfaces.get(i + 1).map_or(end, |(next, _)| next.position);
+            links.push(Link::new(scene, before, (surface, *delta), after)?);
         }
         Ok(Self(links))
     }
 
     /// Its vertices.
+    pub fn links(&self) -> &[Link] {
+        &self.0
+    }
+
+    /// Where they lie.
     pub fn surfaces(&self) -> impl ExactSizeIterator<Item = &Surface> {
-        self.0.iter().map(|(surface, _)| surface)
+        self.0.iter().map(|link| &link.surface)
     }
 
     /// How its first vertex moves with the goal, in the tangents of [`Scene::patch`](crate::scene::Scene::patch) and of the
@@ -121,9 +173,9 @@ impl Chain {
         }
         // It does not move, so only its place is of account.
         let fixed = Patch { position: start.position, ..goal.0 };
-        let links = patches.iter().zip(&self.0).enumerate().map(|(i, (here, (_, turn)))| {
+        let links = patches.iter().zip(&self.0).enumerate().map(|(i, (here, link))| {
             let before = if i == 0 { &fixed } else { &patches[i - 1] };
-            derivatives(before, (here, *turn), patches.get(i + 1).unwrap_or(&goal.0))
+            derivatives(before, (here, link.turn), patches.get(i + 1).unwrap_or(&goal.0))
         });
         Ok((transfer(links).ok_or(Rejection::Singular)?, patches.first().unwrap_or(&goal.0).tangents))
     }
@@ -134,7 +186,7 @@ impl Chain {
     /// # Errors
     /// As [`Chain::transfer`].
     pub fn spread(&self, scene: &Caster<'_>, start: &Node, goal: &Goal) -> Result<f64, Rejection> {
-        let (first, _) = self.0.first().ok_or(Rejection::Unsuitable)?;
+        let first = self.surfaces().next().ok_or(Rejection::Unsuitable)?;
         let edge = first.position - start.position;
         let arriving = first.geometric.dot(edge.normalize()).abs();
         let transfer = self.transfer(scene, start, goal)?;
@@ -148,7 +200,7 @@ impl Chain {
     /// # Errors
     /// As [`Chain::transfer`].
     pub fn geometric_term(&self, scene: &Caster<'_>, start: &Node, goal: &Goal) -> Result<f64, Rejection> {
-        let (first, _) = self.0.first().ok_or(Rejection::Unsuitable)?;
+        let first = self.surfaces().next().ok_or(Rejection::Unsuitable)?;
         Ok(start.cos((first.position - start.position).normalize()) * self.spread(scene, start, goal)?)
     }
 
@@ -157,16 +209,13 @@ impl Chain {
         let mut links = ArrayVec::new();
         let mut direction = (first - start.position).try_normalize()?;
         let mut origin = start.leave(direction);
-        for (old, turn) in &self.0 {
+        for link in &self.0 {
             let surface = scene.intersect(origin, direction)?;
-            let onward = turn.onward(&surface, -direction)?;
-            // By its law it must also stay on the sides of the true surface that it was on.
-            let found = Turn::at(scene, &surface, -direction, onward);
-            let passes = direction.dot(surface.geometric) * onward.dot(surface.geometric) > 0.0;
-            if surface.bsdf != old.bsdf || found != Some(*turn) || passes != (*turn != Turn::Reflected) {
+            if surface.bsdf != link.surface.bsdf {
                 return None;
             }
-            links.push((surface, *turn));
+            let onward = link.onward(scene, &surface, -direction)?;
+            links.push(Link { surface, ..*link });
             origin = surface.leave(onward);
             direction = onward;
         }
@@ -182,7 +231,7 @@ impl Chain {
     /// # Errors
     /// What [`Rejection`] lists.
     pub fn walk(&self, scene: &Caster<'_>, start: &Node, goal: &Goal) -> Result<(Self, usize), Rejection> {
-        let Some((first, _)) = self.0.first() else { return Err(Rejection::Unsuitable) };
+        let Some(first) = self.surfaces().next() else { return Err(Rejection::Unsuitable) };
         let mut now = self.trace(scene, start, first.position).ok_or(Rejection::Unsuitable)?;
         let mut miss = now.miss(goal).ok_or(Rejection::Unsuitable)?;
         let mut share = 1.0;
@@ -200,7 +249,7 @@ impl Chain {
                     *planned.insert(s * x + t * y)
                 }
             };
-            let next = now.chain.trace(scene, start, now.chain.0[0].0.position + step * share);
+            let next = now.chain.trace(scene, start, now.chain.0[0].surface.position + step * share);
             steps += 1;
             match next.and_then(|next| next.miss(goal).map(|miss| (next, miss))) {
                 Some((next, less)) if less.length() < miss.length() => {
@@ -222,6 +271,6 @@ impl Chain {
 
 impl Traced {
     fn miss(&self, goal: &Goal) -> Option<DVec2> {
-        goal.miss(self.chain.0.last()?.0.position, self.onward)
+        goal.miss(self.chain.0.last()?.surface.position, self.onward)
     }
 }

@@ -79,7 +79,7 @@ impl Default for Mutations {
             large_steps: LargeSteps::Plain,
             separate_direct: true,
             path_space: PathMutations::default(),
-            path_step: 0.5,
+            path_step: 0.2,
         }
     }
 }
@@ -96,6 +96,9 @@ pub enum MutationsError {
     /// A length of steps that is none.
     #[error("the size of small steps is {0}; expected a number above 0, at most 0.5")]
     Step(f64),
+    /// No roughness.
+    #[error("the roughness of glossy chains is {0}; expected a number from 0 to 1")]
+    Gloss(f64),
     /// Angles of perturbations that are none.
     #[error("the angles of perturbations go from {0} to {1}; expected ascending numbers above 0, at most 1")]
     Angles(f64, f64),
@@ -121,6 +124,9 @@ impl Mutations {
         let Radii { least, most } = self.path_space.angles;
         if !(least > 0.0 && least < most && most <= 1.0) {
             return Err(MutationsError::Angles(least, most));
+        }
+        if !(0.0..=1.0).contains(&self.path_space.glossy) {
+            return Err(MutationsError::Gloss(self.path_space.glossy));
         }
         let size = self.small_step.size();
         if !(size > 0.0 && size <= 0.5) {

@@ -8,7 +8,7 @@ use crate::paths::Course;
 /// How it may move a path, if at all.
 pub(super) fn plan(course: &Course) -> Option<Plan> {
     let seen = course.edges() - 1;
-    if seen == 0 || course.nodes[seen].delta {
+    if seen == 0 || course.nodes[seen].linked {
         return None;
     }
     let from = next_free(course, seen, Walk::FromCamera)?;

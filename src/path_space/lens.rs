@@ -10,6 +10,6 @@ use crate::paths::Course;
 pub(super) fn plan(course: &Course) -> Option<Plan> {
     let walk = Walk::FromCamera;
     let first = next_free(course, course.edges(), walk)?;
-    let connects = first == 0 || !course.nodes[first - 1].delta;
+    let connects = first == 0 || !course.nodes[first - 1].linked;
     connects.then_some(Plan { from: course.edges(), walk, stops: 1 })
 }

@@ -12,7 +12,7 @@ use crate::scene::Caster;
 pub(super) fn plans(scene: &Caster<'_>, course: &Course, plans: &mut Vec<Plan>) {
     let flat = matches!(scene.camera.projection, Projection::Orthographic { .. });
     for walk in [Walk::FromCamera, Walk::FromLight] {
-        for from in (0..=course.edges()).filter(|m| !course.nodes[*m].delta) {
+        for from in (0..=course.edges()).filter(|m| !course.nodes[*m].linked) {
             let Some(moved) = next_free(course, from, walk) else { continue };
             let Some(end) = next_free(course, moved, walk) else { continue };
             // Chains to parallel light, or to a camera without a lens, have no end that stays.

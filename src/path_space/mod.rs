@@ -47,8 +47,9 @@ pub use steps::Radii;
 
 use crate::manifold::Rejection;
 use crate::math::{Stream, Walk};
-use crate::paths::{Course, Found, FullPath, TECHNIQUES, Techniques, connect_visible};
-use crate::scene::Caster;
+use crate::paths::{Course, Found, FullPath, Node, TECHNIQUES, Techniques, connect_visible};
+use crate::scene::{Caster, Scene};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// The mutations.
@@ -115,11 +116,13 @@ pub struct PathMutations {
     pub kinds: Kinds,
     /// How far directions move, in radians.
     pub angles: Radii,
+    /// Roughness α below which a vertex that has nothing but one microfacet lobe is one of a chain: it keeps its half-vector.
+    pub glossy: f64,
 }
 
 impl Default for PathMutations {
     fn default() -> Self {
-        Self { kinds: Kinds([true; Kind::ALL.len()]), angles: Radii { least: 1e-4, most: 0.1 } }
+        Self { kinds: Kinds([true; Kind::ALL.len()]), angles: Radii { least: 1e-4, most: 0.1 }, glossy: 0.1 }
     }
 }
 
@@ -155,6 +158,37 @@ struct Plan {
     walk: Walk,
     /// Free vertices that move.
     stops: usize,
+}
+
+/// A path's surroundings, as a mutation sees them.
+struct View<'a> {
+    scene: &'a Caster<'a>,
+    /// Light vertices of the technique that the contribution is that of.
+    technique: usize,
+    mutations: PathMutations,
+}
+
+impl View<'_> {
+    /// The walk in which the technique passes the chain of delta vertices between two others.
+    fn passes(&self, one: usize, other: usize) -> Walk {
+        if self.technique > one.max(other) { Walk::FromLight } else { Walk::FromCamera }
+    }
+
+    /// Whether a vertex is one of a chain although it is no delta vertex, met from the unit vector `back`.
+    fn is_glossy(&self, node: &Node, back: DVec3) -> bool {
+        let Some(surface) = node.surface().filter(|surface| !node.delta && surface.up.z >= 1.0) else { return false };
+        let alpha = self.scene.bsdf(surface.bsdf).gloss(&surface.site, surface.frame.to_local(back));
+        alpha.is_some_and(|alpha| alpha < self.mutations.glossy)
+    }
+
+    /// Marks the vertices of chains.
+    fn mark(&self, course: &mut Course) {
+        for m in 1..course.edges() {
+            let back = course.direction(self.scene, m).unwrap_or(DVec3::ZERO);
+            let node = course.nodes[m];
+            course.nodes[m].linked = node.delta || self.is_glossy(&node, back);
+        }
+    }
 }
 
 /// What a mutation has made of a path, before anything is known of its contribution.
@@ -205,15 +239,20 @@ impl PathSpace {
         if !self.old.follow(path) {
             return Proposed { kind: None, outcome: Err(Rejection::Unsuitable) };
         }
+        let view = View { scene, technique: path.light.vertices.len(), mutations: self.mutations };
+        view.mark(&mut self.old);
         let suitable = self.suitable(scene, Which::Old);
         let number = (stream.number() * suitable.len() as f64) as usize;
         let Some(&kind) = suitable.get(number) else {
             return Proposed { kind: None, outcome: Err(Rejection::Unsuitable) };
         };
-        let outcome = self.mutate(kind, scene, path, stream).and_then(|draft| {
+        let outcome = self.mutate(kind, &view, stream).and_then(|draft| {
             let found = self.judge(scene, &draft, (path, current), proposal).ok_or(Rejection::Dark)?;
             let choice = match kind {
-                Kind::Bidirectional => suitable.len() as f64 / self.suitable(scene, Which::New).len() as f64,
+                Kind::Bidirectional => {
+                    view.mark(&mut self.new);
+                    suitable.len() as f64 / self.suitable(scene, Which::New).len() as f64
+                }
                 _ => 1.0,
             };
             Ok((found.0, found.1 * choice))
@@ -237,15 +276,9 @@ impl PathSpace {
     }
 
     /// Draws a new course.
-    fn mutate(
-        &mut self,
-        kind: Kind,
-        scene: &Caster<'_>,
-        path: &FullPath,
-        stream: &mut Stream,
-    ) -> Result<Draft, Rejection> {
+    fn mutate(&mut self, kind: Kind, view: &View<'_>, stream: &mut Stream) -> Result<Draft, Rejection> {
         let Self { old, new, plans, .. } = self;
-        let technique = path.light.vertices.len();
+        let View { scene, technique, .. } = *view;
         if kind == Kind::Bidirectional {
             let lengths = match self.target {
                 Target::Technique => Lengths::Same,
@@ -261,7 +294,7 @@ impl PathSpace {
         plan(kind, scene, old, plans);
         let number = (stream.number() * plans.len() as f64) as usize;
         let plan = plans.get(number).ok_or(Rejection::Unsuitable)?;
-        let ratio = perturb::propose(scene, old, technique, plan, self.mutations.angles, stream, new)?;
+        let ratio = perturb::propose(view, old, plan, stream, new)?;
         Ok(Draft { technique, ratio, ranges: None })
     }
 
@@ -320,8 +353,17 @@ fn plan(kind: Kind, scene: &Caster<'_>, course: &Course, plans: &mut Vec<Plan>) 
     }
 }
 
-/// The next free vertex from x_m on, as `walk` goes; `None` where the path ends.
+/// The next free vertex from x_m on, one that is none of a chain, as `walk` goes; `None` where the path ends.
 fn next_free(course: &Course, m: usize, walk: Walk) -> Option<usize> {
+    let mut at = onward(course, m, walk)?;
+    while course.nodes[at].linked {
+        at = onward(course, at, walk)?;
+    }
+    Some(at)
+}
+
+/// The next vertex from x_m on that is no delta vertex.
+fn next_fixed(course: &Course, m: usize, walk: Walk) -> Option<usize> {
     let mut at = onward(course, m, walk)?;
     while course.nodes[at].delta {
         at = onward(course, at, walk)?;
@@ -338,7 +380,7 @@ fn onward(course: &Course, m: usize, walk: Walk) -> Option<usize> {
 }
 
 /// Unit vector from x_m to the next vertex.
-fn direction_onward(scene: &Caster<'_>, course: &Course, m: usize, walk: Walk) -> Option<glam::DVec3> {
+fn direction_onward(scene: &Scene, course: &Course, m: usize, walk: Walk) -> Option<DVec3> {
     match walk {
         Walk::FromCamera => Some(-course.direction(scene, m.checked_sub(1)?)?),
         Walk::FromLight => course.direction(scene, m),

@@ -12,7 +12,7 @@ pub(super) fn plan(course: &Course) -> Option<Plan> {
     let from = course.edges();
     let mut at = next_free(course, from, walk)?;
     let mut stops = 1;
-    while at > 0 && course.nodes[at - 1].delta {
+    while at > 0 && course.nodes[at - 1].linked {
         at = next_free(course, at, walk)?;
         stops += 1;
     }

@@ -1,57 +1,24 @@
 //! A part of a path, traced anew: it meets other points, and does there what the path did.
 
-use super::onward;
+use super::{View, direction_onward, onward};
 use crate::emitter::Start;
-use crate::manifold::Turn;
+use crate::manifold::Link;
 use crate::math::Walk;
 use crate::paths::{Course, Node, VertexKind};
-use crate::scene::{Caster, Origin, Scene, Surface};
+use crate::scene::{Origin, Scene, Surface};
 use glam::DVec3;
 
-/// What a delta lobe does with light.
-#[derive(Clone, Copy)]
-enum Passage {
-    /// Nothing: it goes straight on.
-    Straight,
-    /// It is bent.
-    Turned(Turn),
-}
-
-impl Passage {
-    /// Between the unit vectors `from`, back to where a walk comes from, and `onward`.
-    fn at(scene: &Scene, surface: &Surface, from: DVec3, onward: DVec3) -> Option<Self> {
-        if from.distance_squared(-onward) < 1e-18 {
-            return Some(Self::Straight);
-        }
-        Turn::at(scene, surface, from, onward).map(Self::Turned)
-    }
-
-    /// Where light goes on that comes from the unit vector `from`. A relief may do anything.
-    fn onward(self, scene: &Scene, old: &Surface, surface: &Surface, from: DVec3) -> Option<DVec3> {
-        match self {
-            Self::Straight => Some(-from),
-            Self::Turned(_) if old.up.z < 1.0 || surface.up.z < 1.0 => None,
-            Self::Turned(turn) => {
-                let onward = turn.onward(surface, from)?;
-                // The same turn: into the medium that it was, and on the right side of the true surface.
-                let passes = from.dot(surface.geometric) * onward.dot(surface.geometric) < 0.0;
-                let same = Turn::at(scene, surface, from, onward) == Some(turn);
-                (same && passes == (turn != Turn::Reflected)).then_some(onward)
-            }
-        }
-    }
-}
-
-/// Walks from `origin`, which belongs to x_`from`, along `direction` through delta vertices as `old` has them, to the next
-/// free vertex, and leaves what it met in `new`: the number of that vertex. `None` where it meets something else.
+/// Walks from `origin`, which belongs to x_`from`, along `direction` through a chain that does what `old` does there, to the
+/// next free vertex, and leaves what it met in `new`: the number of that vertex. `None` where it meets something else.
 pub(super) fn retrace(
-    scene: &Caster<'_>,
+    view: &View<'_>,
     old: &Course,
     new: &mut Course,
     from: usize,
     (mut origin, mut direction): (Origin, DVec3),
     walk: Walk,
 ) -> Option<usize> {
+    let scene = view.scene;
     let mut at = from;
     loop {
         let next = onward(old, at, walk)?;
@@ -62,20 +29,51 @@ pub(super) fn retrace(
             return Some(0);
         }
         let surface = met?;
+        let node = Node { linked: was.linked, ..Node::on(surface, was.delta) };
+        // What is no delta vertex must be as glossy as before, or as little, and light must scatter there at all.
         if !was.delta {
             let wi = surface.frame.to_local(-direction);
             let connects = !scene.bsdf(surface.bsdf).is_delta(scene.met(&surface, wi));
-            new.nodes[next] = Node::on(surface, false);
-            return (connects && next < old.edges()).then_some(next);
+            if !connects || next == old.edges() || view.is_glossy(&node, -direction) != was.linked {
+                return None;
+            }
         }
-        let old_surface = was.surface()?;
-        let back = -super::direction_onward(scene, old, at, walk)?;
-        let passage = Passage::at(scene, old_surface, back, super::direction_onward(scene, old, next, walk)?)?;
-        let then = passage.onward(scene, old_surface, &surface, -direction)?;
-        new.nodes[next] = Node::on(surface, true);
+        new.nodes[next] = node;
+        if !was.linked {
+            return Some(next);
+        }
+        let then = pass(scene, old, at, next, walk, &surface, -direction)?;
         (origin, direction, at) = (surface.leave(then), then, next);
     }
 }
+
+/// Where light goes on that meets `surface` in place of x_`here`, coming from `from`, when it does the same there.
+fn pass(
+    scene: &Scene,
+    old: &Course,
+    before: usize,
+    here: usize,
+    walk: Walk,
+    surface: &Surface,
+    from: DVec3,
+) -> Option<DVec3> {
+    let node = &old.nodes[here];
+    let old_surface = node.surface()?;
+    let (back, onward) = (-direction_onward(scene, old, before, walk)?, direction_onward(scene, old, here, walk)?);
+    if node.delta && back.distance_squared(-onward) < STRAIGHT {
+        return Some(-from);
+    }
+    // A relief may do anything.
+    if old_surface.up.z < 1.0 || surface.up.z < 1.0 {
+        return None;
+    }
+    let position = old_surface.position;
+    let link = Link::new(scene, position + back, (old_surface, node.delta), position + onward).ok()?;
+    link.onward(scene, surface, from)
+}
+
+/// Square of the angle below which light goes straight on.
+const STRAIGHT: f64 = 1e-18;
 
 /// The light that a walk from the camera has met, where the path had `was`.
 fn light(scene: &Scene, was: &Node, met: Option<Surface>, direction: DVec3) -> Option<(Node, Option<Surface>)> {

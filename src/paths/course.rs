@@ -26,12 +26,14 @@ pub struct Node {
     pub position: DVec3,
     /// Whether it scatters by a delta lobe.
     pub delta: bool,
+    /// Whether it is a vertex of a chain, which follows when the chain's ends move: a delta vertex, or nearly one.
+    pub linked: bool,
 }
 
 impl Node {
     /// The vertex at a point of a surface.
     pub const fn on(surface: Surface, delta: bool) -> Self {
-        Self { position: surface.position, kind: VertexKind::Surface(surface), delta }
+        Self { position: surface.position, kind: VertexKind::Surface(surface), delta, linked: delta }
     }
 
     /// The vertex where light starts.
@@ -40,12 +42,12 @@ impl Node {
             Start::Surface { position, .. } | Start::Point { position } => position,
             Start::Infinite { .. } | Start::Distant { .. } => DVec3::ZERO,
         };
-        Self { kind: VertexKind::Light(id, start), position, delta: false }
+        Self { kind: VertexKind::Light(id, start), position, delta: false, linked: false }
     }
 
     /// The vertex on the lens.
     pub const fn lens(position: DVec3) -> Self {
-        Self { kind: VertexKind::Camera, position, delta: false }
+        Self { kind: VertexKind::Camera, position, delta: false, linked: false }
     }
 
     /// Its surface, of one that scatters.
@@ -116,7 +118,8 @@ impl Course {
         self.nodes.push(Node::light(id, start));
         self.nodes.extend((1..=path.edges()).map(|m| {
             let vertex = path.vertex(m);
-            Node { kind: vertex.kind, position: vertex.position, delta: path.scatters_delta(m) }
+            let delta = path.scatters_delta(m);
+            Node { kind: vertex.kind, position: vertex.position, delta, linked: delta }
         }));
         true
     }
