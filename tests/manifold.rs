@@ -151,7 +151,6 @@ fn relative(found: DMat2, expected: DMat2) -> f64 {
 #[test]
 fn derivatives_are_those_of_the_law() {
     const STEP: f64 = 1e-5;
-    const BESIDE: f64 = 0.05;
     for case in cases() {
         let scene = Caster::new(&case.scene);
         let (mut worst, mut seen) = (0.0, 0);
@@ -235,6 +234,7 @@ fn walks_arrive_and_return() {
 #[test]
 fn first_vertices_follow_the_goal() {
     const STEP: f64 = 1e-5;
+    const BESIDE: f64 = 0.05;
     for case in cases() {
         let scene = Caster::new(&case.scene);
         let mut errors = Vec::new();

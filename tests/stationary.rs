@@ -99,6 +99,99 @@ fn quarters(images: &[Image], class: &str) -> Vec<Estimate> {
 /// Every mutation alone, and with jumps.
 fn cases() -> Vec<(&'static str, Method, Mutations)> {
     let never = Mutations { large_step: 0.0, jump: 0.0, ..Mutations::default() };
+    let jumping = Mutations { jump: 0.3, ..never };
+    let tries = Mutations { large_step: 1.0, large_steps: LargeSteps::TriesFrom(0), ..never };
+    let kelemen = Mutations { small_step: SmallStep::KELEMEN, ..never };
+    vec![
+        ("small steps", Method::Mmlt, never),
+        ("Kelemen's steps", Method::Mmlt, kelemen),
+        ("Kelemen's steps and jumps", Method::Rjmlt, Mutations { jump: 0.3, ..kelemen }),
+        ("steps by pixels", Method::Mmlt, Mutations { film_steps: FilmSteps::Pixels(2.0), ..never }),
+        ("kept choices", Method::Mmlt, Mutations { keep_choices: true, ..never }),
+        ("controlled steps", Method::Mmlt, Mutations { controlled: true, ..never }),
+        ("controlled steps and jumps", Method::Rjmlt, Mutations { controlled: true, ..jumping }),
+        ("small steps without jumps", Method::Rjmlt, never),
+        ("small steps and jumps", Method::Rjmlt, jumping),
+        ("jumps before small steps", Method::Rjmlt, Mutations { jumps: Jumps::Always, ..never }),
+        ("jumps alone", Method::Rjmlt, Mutations { jump: 1.0, ..never }),
+        ("kept choices and jumps", Method::Rjmlt, Mutations { keep_choices: true, ..jumping }),
+        ("large steps", Method::Rjmlt, Mutations { large_step: 1.0, ..never }),
+        ("tries", Method::Mmlt, tries),
+        ("tries and jumps", Method::Rjmlt, Mutations { large_step: 0.5, jump: 0.5, ..tries }),
+        ("small steps of all lengths", Method::Pssmlt, never),
+        ("Kelemen's steps of all lengths", Method::Pssmlt, kelemen),
+        ("kept choices of all lengths", Method::Pssmlt, Mutations { keep_choices: true, ..never }),
+    ]
+}
+
+/// A class in one quarter of the image, and its light.
+struct Part {
+    class: String,
+    quarter: usize,
+    light: Estimate,
+    /// Its share of the light of its length.
+    of_length: f64,
+    /// Its share of the light of all lengths that chains find.
+    of_all: f64,
+}
+
+impl Part {
+    /// Whether it has a twenty-fifth of the light of a chain's target at least: of a thousand chains forty begin there.
+    fn is_large(&self, method: Method) -> bool {
+        let share = if matches!(method, Method::Mlt | Method::Pssmlt) { self.of_all } else { self.of_length };
+        share > 0.04
+    }
+}
+
+/// The light of every class in every quarter.
+fn parts(scene: &Scene, passes: u64) -> Vec<Part> {
+    let truth = images(scene, Method::Bdpt, passes);
+    let classes = truth[0].layers.keys().filter(|name| name.starts_with("path_"));
+    let part = |class: &String| {
+        let quarters = quarters(&truth, class).into_iter().enumerate();
+        let part = |(quarter, light)| Part { class: class.clone(), quarter, light, of_length: 0.0, of_all: 0.0 };
+        quarters.map(part).collect::<Vec<_>>()
+    };
+    let mut parts: Vec<Part> = classes.flat_map(part).collect();
+    // Names of layers are longer by four letters than paths have edges, and two edges are left to path tracing.
+    parts.retain(|part| part.class.len() > "path_LDE".len());
+    let light = |length: Option<usize>| -> f64 {
+        let chosen = parts.iter().filter(|part| length.is_none_or(|length| length == part.class.len()));
+        chosen.map(|part| part.light.mean).sum()
+    };
+    let (all, lengths): (f64, Vec<f64>) = (light(None), (0..20).map(|length| light(Some(length))).collect());
+    for part in &mut parts {
+        let own = part.light.mean;
+        (part.of_length, part.of_all) = (own / lengths[part.class.len()], own / all);
+    }
+    parts
+}
+
+/// Wide controlled steps.
+fn controlled() -> Vec<(&'static str, Method, Mutations)> {
+    let small_step = SmallStep::Gaussian { deviation: 0.1 };
+    let wide = Mutations { large_step: 0.0, jump: 0.0, controlled: true, small_step, ..Mutations::default() };
+    vec![
+        ("wide controlled steps", Method::Mmlt, wide),
+        ("wide controlled steps and jumps", Method::Rjmlt, Mutations { jump: 0.3, ..wide }),
+    ]
+}
+
+/// Each mutation in path space alone, all of them, and with others.
+fn in_path_space() -> Vec<(&'static str, Method, Mutations)> {
+    let alone = |kinds: &[Kind]| {
+        let path_space = PathMutations { kinds: kinds.to_vec().into(), ..PathMutations::default() };
+        Mutations { large_step: 0.0, jump: 0.0, path_step: 1.0, path_space, ..Mutations::default() }
+    };
+    let kinds: [(_, &[Kind]); 6] = [
+        ("bidirectional", &[Kind::Bidirectional]),
+        ("lens", &[Kind::Lens]),
+        ("caustic", &[Kind::Caustic]),
+        ("multi-chain", &[Kind::MultiChain]),
+        ("manifold", &[Kind::Manifold]),
+        ("all in path space", &Kind::ALL),
+    ];
+    let fused = kinds.map(|(name, kind)| (name, Method::Fused, alone(kind)));
     let jumping = Mutations { jump: 0.4, ..alone(&Kind::ALL) };
     let mixed = Mutations { path_step: 0.5, jump: 0.2, ..alone(&Kind::ALL) };
     let mlt = kinds.map(|(name, kind)| (name, Method::Mlt, alone(kind)));
