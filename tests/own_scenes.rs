@@ -12,8 +12,17 @@ use std::path::{Path, PathBuf};
 
 const SCENES: [&str; 11] =
     ["box", "spheres", "plates", "door", "torus", "ring", "lamp", "gallery", "pool", "bokeh", "porch"];
-const METHODS: [Method; 7] =
-    [Method::Path, Method::Bdpt, Method::Sppm, Method::Vcm, Method::Pssmlt, Method::Mmlt, Method::Rjmlt];
+const METHODS: [Method; 9] = [
+    Method::Path,
+    Method::Bdpt,
+    Method::Sppm,
+    Method::Vcm,
+    Method::Pssmlt,
+    Method::Mmlt,
+    Method::Rjmlt,
+    Method::Mlt,
+    Method::Fused,
+];
 /// Side of the references, and of the tiles that they are compared in.
 const SIDE: usize = 64;
 const TILE: usize = 16;
@@ -192,68 +201,96 @@ impl Deviations {
             self.worst = (class.to_owned(), z, relative);
         }
     }
+}
 
-    fn print(&self, scene: &str, method: &str, ratio: f64) {
-        let (class, z, relative) = &self.worst;
-        println!(
-            "| {scene} | {method} | {} | {class} | {z:.1} | {:+.2} % | {ratio:.4} |",
-            self.count,
-            100.0 * relative
-        );
+/// The classes with a thousandth of the light at least.
+fn large(classes: &Classes) -> impl Iterator<Item = (&String, &(f64, f64))> {
+    classes.iter().filter(|(_, class)| class.0 >= 1e-3 * classes["all"].0)
+}
+
+/// The worst deviations of each method on each scene, printed as they come.
+struct Table(Vec<(&'static str, Method, Deviations)>);
+
+impl Table {
+    fn new() -> Self {
+        println!("| scene | method | classes | worst | z | deviation | mean ratio |\n|---|---|---|---|---|---|---|");
+        Self(Vec::new())
+    }
+
+    fn add(&mut self, scene: &'static str, method: Method, ratio: f64, deviations: Deviations) {
+        let Deviations { count, worst: (class, z, relative) } = &deviations;
+        let (method_name, percent) = (method.name(), 100.0 * relative);
+        println!("| {scene} | {method_name} | {count} | {class} | {z:.1} | {percent:+.2} % | {ratio:.4} |");
+        self.0.push((scene, method, deviations));
+    }
+
+    fn check(self) {
+        for (name, method, Deviations { worst: (class, z, _), .. }) in self.0 {
+            assert!(z < 9.0, "{name}, {}: class {class} is {z:.1} standard errors off", method.name());
+        }
     }
 }
 
-/// All classes that carry a thousandth of the light, all scenes, all methods: prints the table that it checks. Takes some
-/// forty minutes.
-///
-/// Of chains those classes are judged of which bdpt knows the light to a percent. The others have one technique only and
-/// hardly ever find light by it; a chain that comes upon one stays for longer than these runs last, so that most runs
-/// miss it and their spread says nothing of that.
+/// Classes that carry a thousandth of the light by bdpt, all scenes, against the methods without chains: prints the table
+/// that it checks. Takes some forty minutes of one core.
 ///
 /// Of `sppm` and `vcm` it is judged how the bias falls: ten times the passes shrink the radius to 10^(−1/6) of it, and the
 /// bias at least in proportion, where it comes from borders.
 #[test]
 #[ignore = "long: cargo test --release --test own_scenes -- --ignored --nocapture"]
 fn methods_agree_class_by_class_on_every_scene() {
-    let mut all = Vec::new();
-    println!("| scene | method | classes | worst | z | deviation | mean ratio |\n|---|---|---|---|---|---|---|");
+    let mut table = Table::new();
     for name in SCENES {
         let scene = scene(name, [48, 48]);
         let bdpt = classes(&scene, Method::Bdpt, 80, 16);
+        let all = bdpt["all"].0;
         let path = classes(&scene, Method::Path, 250, 16);
-        let chains = [Method::Mmlt, Method::Rjmlt].map(|method| (method, classes(&scene, method, 150, 16)));
-        let merging = [Method::Sppm, Method::Vcm];
-        let merging = merging.map(|method| (classes(&scene, method, 100, 16), classes(&scene, method, 1000, 8)));
-        let mut deviations: [Deviations; 5] = Default::default();
-        for (word, &(truth, error)) in bdpt.iter().filter(|(_, class)| class.0 >= 1e-3 * bdpt["all"].0) {
+        let mut deviations = Deviations::default();
+        for (word, &(truth, error)) in large(&bdpt) {
             // What only a point light makes, no walk from the camera finds.
             if name != "bokeh" || !(word.contains("LS") || word == "all") {
                 let (mean, own) = class(&path, word);
-                deviations[0].add(word, (mean - truth).abs() / error.hypot(own), mean / truth - 1.0);
+                deviations.add(word, (mean - truth).abs() / error.hypot(own), mean / truth - 1.0);
             }
-            if error < 0.01 * truth {
-                for (deviations, (_, found)) in deviations[1..].iter_mut().zip(&chains) {
-                    let (mean, own) = class(found, word);
-                    deviations.add(word, (mean - truth).abs() / error.hypot(own), mean / truth - 1.0);
-                }
-            }
-            for (deviations, (few, many)) in deviations[3..].iter_mut().zip(&merging) {
-                let ((few, error_few), (many, error_many)) = (class(few, word), class(many, word));
+        }
+        table.add(name, Method::Path, path["all"].0 / all, deviations);
+        for method in [Method::Sppm, Method::Vcm] {
+            let [few, many] = [(100, 16), (1000, 8)].map(|(passes, runs)| classes(&scene, method, passes, runs));
+            let mut deviations = Deviations::default();
+            for (word, &(truth, error)) in large(&bdpt) {
+                let ((few, error_few), (many, error_many)) = (class(&few, word), class(&many, word));
                 let excess = (many - truth).abs() - 0.8 * (few - truth).abs();
                 deviations.add(word, excess / error.hypot(error_many).hypot(0.8 * error_few), many / truth - 1.0);
             }
-        }
-        let ([(_, sppm), (_, vcm)], [(_, mmlt), (_, rjmlt)]) = (merging, chains);
-        for ((method, light), deviations) in
-            [("path", path), ("mmlt", mmlt), ("rjmlt", rjmlt), ("sppm", sppm), ("vcm", vcm)].into_iter().zip(deviations)
-        {
-            deviations.print(name, method, light["all"].0 / bdpt["all"].0);
-            all.push((name, method, deviations.worst));
+            table.add(name, method, many["all"].0 / all, deviations);
         }
     }
-    for (name, method, (class, z, _)) in all {
-        assert!(z < 9.0, "{name}, {method}: class {class} is {z:.1} standard errors off");
+    table.check();
+}
+
+/// The same of the methods with chains. Takes some ten minutes of one core.
+///
+/// Those classes are judged of which bdpt knows the light to a percent. The others have one technique only and hardly ever
+/// find light by it; a chain that comes upon one stays for longer than these runs last, so that most runs miss it and
+/// their spread says nothing of that.
+#[test]
+#[ignore = "long: cargo test --release --test own_scenes -- --ignored --nocapture"]
+fn chains_agree_class_by_class_on_every_scene() {
+    let mut table = Table::new();
+    for name in SCENES {
+        let scene = scene(name, [48, 48]);
+        let bdpt = classes(&scene, Method::Bdpt, 80, 16);
+        for method in [Method::Mmlt, Method::Rjmlt, Method::Mlt, Method::Fused] {
+            let found = classes(&scene, method, 150, 16);
+            let mut deviations = Deviations::default();
+            for (word, &(truth, error)) in large(&bdpt).filter(|(_, (truth, error))| *error < 0.01 * truth) {
+                let (mean, own) = class(&found, word);
+                deviations.add(word, (mean - truth).abs() / error.hypot(own), mean / truth - 1.0);
+            }
+            table.add(name, method, found["all"].0 / bdpt["all"].0, deviations);
+        }
     }
+    table.check();
 }
 
 /// The bias of photon mapping shrinks as its radius does.
