@@ -5,10 +5,10 @@
 //! The vertices that scatter by no delta lobe are where they are, each with its area as measure; the others follow from
 //! these, as the light's laws say. Between two free vertices a and b with delta vertices between, the contribution f holds
 //! the generalised geometric term instead of the plain one, with dω_a / dA_b along the chain ([`Chain::spread`]). A walk that
-//! passes the chain from a to b has the same factor in its density, where f and the density T of a mutation both have it
-//! nothing of it is left, and the product of cos θ / d² over the edges, which [`FullPath::density`] takes instead, does as
-//! well. Only where f has been found by a walk that passes a chain the other way round than the mutation does, or where the
-//! mutation has not traced the chain but walked there on its manifold, the factor
+//! passes the chain from a to b has the same factor in its density. Where f and the density T of a mutation both have it,
+//! nothing of it is left, and the product of cos θ / d² over the edges does as well, which [`FullPath::density`] takes
+//! instead. Only where f has been found by a walk that passes a chain the other way round than the mutation does, or where
+//! the mutation has not traced the chain but walked there on its manifold, the factor
 //!
 //! ```text
 //! Γ(a → b) = dω_a / dA_b  /  Π cos θ_{i+1} / d²
@@ -16,8 +16,11 @@
 //!
 //! is left over ([`gamma`]).
 //!
+//! A glossy vertex of a chain has its area as measure, but keeps its half-vector in perturbations. So T has its density by
+//! the solid angle that it scatters into ([`offset_density`]), where others have that of a lobe.
+//!
 //! # The acceptance
-//! With C(x) = w_s f / p_s as the technique (s, t) finds it, Thesis ch. 6, eq. 6.24, is
+//! With C(x) = w_s f / p_s as the technique (s, t) finds it, the acceptance is (Otsu 2017, eq. 6.24)
 //!
 //! ```text
 //! a(x → y) = w_s(y) f(y) T(y → x) / (w_s(x) f(x) T(x → y)) = C(y) p_s(y) T(y → x) / (C(x) p_s(x) T(x → y)),
@@ -28,6 +31,7 @@
 //! A mutation is drawn evenly among those that suit the path, so that T has their number, too. Perturbations keep which
 //! vertices scatter by delta lobes and how; both ways have the same choice. Only [`bidirectional`] changes them.
 //!
+//! [`offset_density`]: crate::manifold::offset_density
 //! [`Chain::spread`]: crate::manifold::Chain::spread
 //! [`FullPath::density`]: crate::paths::FullPath::density
 
@@ -49,6 +53,7 @@ use crate::manifold::Rejection;
 use crate::math::{Stream, Walk};
 use crate::paths::{Course, Found, FullPath, Node, TECHNIQUES, Techniques, connect_visible};
 use crate::scene::{Caster, Scene};
+use arrayvec::ArrayVec;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -241,7 +246,8 @@ impl PathSpace {
         }
         let view = View { scene, technique: path.light.vertices.len(), mutations: self.mutations };
         view.mark(&mut self.old);
-        let suitable = self.suitable(scene, Which::Old);
+        let kinds = self.mutations.kinds;
+        let suitable = suitable(kinds, scene, &self.old, &mut self.plans);
         let number = (stream.number() * suitable.len() as f64) as usize;
         let Some(&kind) = suitable.get(number) else {
             return Proposed { kind: None, outcome: Err(Rejection::Unsuitable) };
@@ -251,28 +257,13 @@ impl PathSpace {
             let choice = match kind {
                 Kind::Bidirectional => {
                     view.mark(&mut self.new);
-                    suitable.len() as f64 / self.suitable(scene, Which::New).len() as f64
+                    suitable.len() as f64 / self::suitable(kinds, scene, &self.new, &mut self.plans).len() as f64
                 }
                 _ => 1.0,
             };
             Ok((found.0, found.1 * choice))
         });
         Proposed { kind: Some(kind), outcome }
-    }
-
-    /// The mutations that suit a course.
-    fn suitable(&mut self, scene: &Caster<'_>, which: Which) -> arrayvec::ArrayVec<Kind, 5> {
-        let course = if which == Which::Old { &self.old } else { &self.new };
-        let plans = &mut self.plans;
-        let suits = |kind: &Kind| {
-            plans.clear();
-            self.mutations.kinds.has(*kind)
-                && (*kind == Kind::Bidirectional || {
-                    plan(*kind, scene, course, plans);
-                    !plans.is_empty()
-                })
-        };
-        Kind::ALL.into_iter().filter(suits).collect()
     }
 
     /// Draws a new course.
@@ -336,10 +327,19 @@ impl PathSpace {
     }
 }
 
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Which {
-    Old,
-    New,
+/// Those of the mutations that suit a course.
+fn suitable(
+    kinds: Kinds,
+    scene: &Caster<'_>,
+    course: &Course,
+    plans: &mut Vec<Plan>,
+) -> ArrayVec<Kind, { Kind::ALL.len() }> {
+    let mut suits = |kind: &Kind| {
+        plans.clear();
+        plan(*kind, scene, course, plans);
+        *kind == Kind::Bidirectional || !plans.is_empty()
+    };
+    Kind::ALL.into_iter().filter(|kind| kinds.has(*kind) && suits(kind)).collect()
 }
 
 /// Adds the ways in which a perturbation may move a path.
