@@ -98,10 +98,10 @@ impl Lengths {
 
     /// The numbers of vertices that may take the place of a part, with their worth.
     fn replacements(self, part: Range) -> impl Iterator<Item = (usize, f64)> + Clone {
-        let kept = part.edges - part.len();
+        let kept = part.edges + 1 - part.len();
         let (least, most) = match self {
             Self::Same => (part.len(), part.len()),
-            Self::Between { least, most } => (least.saturating_sub(kept), most.saturating_sub(kept)),
+            Self::Between { least, most } => ((least + 1).saturating_sub(kept), (most + 1).saturating_sub(kept)),
         };
         (least.max(part.least())..=most).map(move |new| (new, worth_in_place(part.len(), new)))
     }
@@ -137,7 +137,7 @@ pub(super) fn propose(
     let replacements = lengths.replacements(part);
     let chosen = pick(replacements.clone().map(|(_, worth)| worth), stream.number())?;
     let (count, _) = replacements.clone().nth(chosen)?;
-    let replaced = Range { from: part.from, to: part.from + count, edges: edges - part.len() + count };
+    let replaced = Range { from: part.from, to: part.from + count, edges: edges + count - part.len() };
     let technique = part.from + ((stream.number() * replaced.count()) as usize).min(count);
 
     (new.film, new.lit) = (old.film, old.lit.filter(|_| part.from > 0));
