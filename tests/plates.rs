@@ -163,8 +163,9 @@ fn a_slab_of_glass_passes_and_reflects_a_geometric_series() {
         for method in METHODS {
             let images = images(&scene, method, 12);
             worst.expect(method, "beauty", estimate(&images, colour_mean), Estimate::exact(sum, 0.0));
-            // Of what hardly ever happens a spread says nothing.
-            for (word, value) in expected.into_iter().filter(|(_, value)| *value > 1e-3) {
+            // Of what hardly ever happens a spread says nothing, and a chain of paths of all lengths is where the light is.
+            let least = if method == Method::Mlt { 1e-2 } else { 1e-3 };
+            for (word, value) in expected.into_iter().filter(|(_, value)| *value > least) {
                 let found = estimate(&images, |image| class_mean(image, word));
                 worst.expect(method, word, found, Estimate::exact(value, 0.0));
             }
