@@ -37,7 +37,7 @@ pub(super) struct MutationArguments {
     #[arg(long, value_name = "EDGES")]
     tries_from: Option<usize>,
     /// Share of the small steps in whose place paths move in path space: fused.
-    #[arg(long, value_name = "SHARE", default_value_t = 0.2, allow_negative_numbers = true)]
+    #[arg(long, value_name = "SHARE", default_value_t = 0.15, allow_negative_numbers = true)]
     path_step: f64,
     /// Roughness below which vertices with nothing but a microfacet lobe move with their chain: mlt, fused.
     #[arg(long, value_name = "ALPHA", default_value_t = 0.1, allow_negative_numbers = true)]

@@ -79,7 +79,7 @@ impl Default for Mutations {
             large_steps: LargeSteps::Plain,
             separate_direct: true,
             path_space: PathMutations::default(),
-            path_step: 0.2,
+            path_step: 0.15,
         }
     }
 }
