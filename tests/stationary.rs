@@ -201,18 +201,18 @@ fn in_path_space() -> Vec<(&'static str, Method, Mutations)> {
 
 #[test]
 fn path_space_keeps_the_distribution() {
-    keep(&scene(), in_path_space(), 100);
+    keep(&scene(), in_path_space(), 150);
 }
 
 #[test]
 fn path_space_keeps_the_distribution_under_water() {
-    keep(&water(), in_path_space(), 100);
+    keep(&water(), in_path_space(), 150);
 }
 
 /// Vertices that are nearly mirrors, or nearly clear, move with their chains.
 #[test]
 fn path_space_keeps_the_distribution_among_glossy_surfaces() {
-    keep(&polished(), in_path_space(), 100);
+    keep(&polished(), in_path_space(), 150);
 }
 
 #[test]
