@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod common;
+
+use common::METHODS;
 use glam::{DVec2, DVec3, Vec3};
 use pathblend::bsdf::{Bsdf, Conductor, Dielectric, Diffuse, Distribution, RoughConductor, Roughness};
 use pathblend::camera::{Camera, Projection};
@@ -13,17 +16,6 @@ use pathblend::math::Frame;
 use pathblend::scene::{Builder, FilmSpec, Mesh, Scene, Shine};
 use pathblend::spectrum::Spectrum;
 
-const METHODS: [Method; 9] = [
-    Method::Path,
-    Method::Bdpt,
-    Method::Sppm,
-    Method::Vcm,
-    Method::Pssmlt,
-    Method::Mmlt,
-    Method::Rjmlt,
-    Method::Mlt,
-    Method::Fused,
-];
 const SIZE: usize = 16;
 /// Threshold in standard errors. With 15 degrees of freedom a correct program exceeds it about once in 3·10⁵ tests.
 const SIGMAS: f64 = 7.0;

@@ -2,13 +2,16 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod common;
+
+use common::METHODS;
 use glam::{DAffine2, DMat3, DVec2, DVec3, Vec2, Vec3};
 use pathblend::bsdf::{Bsdf, Diffuse};
 use pathblend::camera::{Camera, Projection};
 use pathblend::emitter::{Backdrop, Panorama, Spot, Start, Sun};
 use pathblend::film::Filter;
 use pathblend::geometry::Solid;
-use pathblend::integrators::{Budget, Method, Settings, render};
+use pathblend::integrators::{Budget, Settings, render};
 use pathblend::math::{Frame, warp};
 use pathblend::scene::{Builder, FilmSpec, Mesh, Scene, Shine};
 use pathblend::spectrum::Spectrum;
@@ -16,8 +19,6 @@ use pathblend::texture::{Checkerboard, Colour, Picture, Texels, Texture};
 use std::f64::consts::{FRAC_1_PI, PI};
 use std::sync::Arc;
 
-const METHODS: [Method; 7] =
-    [Method::Path, Method::Bdpt, Method::Sppm, Method::Vcm, Method::Pssmlt, Method::Mmlt, Method::Rjmlt];
 const REFLECTANCE: f64 = 0.8;
 const SIZE: usize = 16;
 /// Threshold in standard errors. With 15 degrees of freedom a correct program exceeds it about once in 3·10⁵ tests.

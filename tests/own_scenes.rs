@@ -3,6 +3,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod common;
+
+use common::METHODS;
 use pathblend::image::{Image, Layer, luminance};
 use pathblend::integrators::{Budget, Method, Settings, render};
 use pathblend::load;
@@ -12,17 +15,6 @@ use std::path::{Path, PathBuf};
 
 const SCENES: [&str; 11] =
     ["box", "spheres", "plates", "door", "torus", "ring", "lamp", "gallery", "pool", "bokeh", "porch"];
-const METHODS: [Method; 9] = [
-    Method::Path,
-    Method::Bdpt,
-    Method::Sppm,
-    Method::Vcm,
-    Method::Pssmlt,
-    Method::Mmlt,
-    Method::Rjmlt,
-    Method::Mlt,
-    Method::Fused,
-];
 /// Side of the references, and of the tiles that they are compared in.
 const SIDE: usize = 64;
 const TILE: usize = 16;

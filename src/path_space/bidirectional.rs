@@ -108,18 +108,17 @@ impl Lengths {
 
     /// Probability that `part` is left out and `new` vertices take its place.
     fn probability(self, part: Range, new: usize) -> f64 {
-        let share = |mut of: Box<dyn Iterator<Item = (bool, f64)>>| {
-            let (mut one, mut all) = (0.0, 0.0);
-            of.by_ref().for_each(|(is, worth)| {
-                all += worth;
-                one += if is { worth } else { 0.0 };
-            });
-            one / all
-        };
         let parts = self.parts(part.edges).map(move |(other, worth)| (other == part, worth));
         let replacements = self.replacements(part).map(move |(count, worth)| (count == new, worth));
-        share(Box::new(parts)) * share(Box::new(replacements))
+        share(parts) * share(replacements)
     }
+}
+
+/// What one of some choices is worth, relative to all.
+fn share(choices: impl Iterator<Item = (bool, f64)>) -> f64 {
+    let (one, all) =
+        choices.fold((0.0, 0.0), |(one, all), (is, worth)| (one + if is { worth } else { 0.0 }, all + worth));
+    one / all
 }
 
 /// Samples part of `old` anew; `None` where it leads nowhere. The technique is that by which the new part was found.
