@@ -6,7 +6,7 @@ use pathblend::film::Health;
 use pathblend::load::{Options, read};
 use pathblend::markov::{ChainState, Jump, JumpMemory, Mutations, Tracer, jump};
 use pathblend::math::{Stream, Walk};
-use pathblend::paths::{Found, FullPath};
+use pathblend::paths::{Found, FullPath, Open};
 use pathblend::scene::{Caster, Scene};
 use rayon::prelude::*;
 use std::path::Path;
@@ -44,7 +44,8 @@ impl Tally {
 fn jumps(scene: &Scene, edges: usize, count: u64, seed: u64) -> Tally {
     let tracer = Tracer { edges };
     let mutations = Mutations::default();
-    let walk = |walk| (0..=edges).map(move |index| mutations.scales(walk, index, [64, 64], false));
+    let open = Open::of(scene);
+    let walk = |walk| (0..=edges).map(move |index| mutations.scales(walk, index, [64, 64], open, false));
     let scales: Vec<_> = std::iter::once([1.0; 4]).chain(walk(Walk::FromCamera)).chain(walk(Walk::FromLight)).collect();
     let caster = Caster::new(scene);
     let mut state = ChainState::new(mutations.small_step, scales.into());

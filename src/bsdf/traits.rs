@@ -51,6 +51,16 @@ impl Bsdf {
         }
     }
 
+    /// Whether [`Bsdf::sample`] may choose among lobes by the first number of a row.
+    pub fn chooses(&self) -> bool {
+        match self {
+            Self::Diffuse(_) => false,
+            Self::TwoSided(sides) => sides.iter().any(Self::chooses),
+            Self::Turned(bsdf) => bsdf.chooses(),
+            _ => true,
+        }
+    }
+
     /// Whether light that arrives from `wi` leaves diffuse-like: where photons are gathered.
     #[inline]
     pub fn gathers(&self, wi: DVec3) -> bool {

@@ -77,6 +77,11 @@ impl Camera {
         }
     }
 
+    /// Whether rays leave a lens and not a point.
+    pub fn has_lens(&self) -> bool {
+        matches!(self.projection, Projection::Perspective { lens_radius, .. } if lens_radius > 0.0)
+    }
+
     /// The film position that the first two numbers of a row stand for, evenly over the film.
     #[inline]
     pub fn film_position(&self, row: Row) -> DVec2 {

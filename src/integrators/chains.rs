@@ -15,14 +15,14 @@ pub(super) fn share(mutations: u64, lane: usize, pass: u64) -> u64 {
     mutations / lanes + u64::from((lane as u64 + pass) % lanes < mutations % lanes)
 }
 
-/// Independent samples before the chains begin: two per pixel, within these bounds. Large steps refine what they find.
-const FIRST_SAMPLES: RangeInclusive<usize> = 20_000..=200_000;
+/// Independent samples before the chains begin: four per pixel, within these bounds. Large steps refine what they find.
+const FIRST_SAMPLES: RangeInclusive<usize> = 100_000..=400_000;
 
 /// Independent samples in the batch with this number, for a film of `size`. Where the first finds no light, each pass draws
 /// another, which takes as long as mutations would.
 pub(super) fn batch_samples(size: [usize; 2], batch: u64) -> usize {
     let pixels = size[0] * size[1];
-    if batch == 0 { (2 * pixels).clamp(*FIRST_SAMPLES.start(), *FIRST_SAMPLES.end()) } else { pixels }
+    if batch == 0 { (4 * pixels).clamp(*FIRST_SAMPLES.start(), *FIRST_SAMPLES.end()) } else { pixels }
 }
 
 /// Independent samples of a target: what tells b_k.
@@ -57,6 +57,27 @@ impl Mean {
     }
 }
 
+/// What passes are worth, of a mean that becomes known better from pass to pass: so much that all together have the latest
+/// mean, those before it was known included.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Worth {
+    given: f64,
+    passes: f64,
+}
+
+impl Worth {
+    /// The most that a pass is worth, in means: what is due beyond that is left to later ones.
+    const MOST: f64 = 3.0;
+
+    /// What the next pass is worth, none less than nothing.
+    pub(super) fn next(&mut self, mean: f64) -> f64 {
+        self.passes += 1.0;
+        let worth = (self.passes * mean - self.given).clamp(0.0, Self::MOST * mean);
+        self.given += worth;
+        worth
+    }
+}
+
 /// Targets of `samples` independent samples, in parallel. `memory` is what one thread needs, `one` gives the target of a
 /// sample by its number.
 pub(super) fn independent<M>(
@@ -74,4 +95,18 @@ pub(super) fn independent<M>(
         })
         .collect();
     chunks.concat()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn passes_add_up_to_the_latest_mean() {
+        let means = [0.0, 0.0, 4.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0];
+        let mut worth = Worth::default();
+        let given = means.map(|mean| worth.next(mean));
+        assert_eq!(given[..4], [0.0, 0.0, 12.0, 0.0]);
+        assert!((given.iter().sum::<f64>() - 12.0 * 2.0).abs() < 1e-12, "{given:?}");
+    }
 }

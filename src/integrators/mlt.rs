@@ -7,13 +7,13 @@
 //!
 //! Light seen directly is rendered by path tracing, and so is direct light unless the settings say otherwise.
 
-use super::chains::{LANES, Mean, batch_samples, independent, share};
+use super::chains::{LANES, Mean, Worth, batch_samples, independent, share};
 use super::{Acceptance, ChainReport, Counts, path::Path, render::Settings};
 use crate::film::{Film, Health, Kernel, Splats};
 use crate::manifold::Rejection;
 use crate::markov::Tracer;
 use crate::math::{Discrete, Stream};
-use crate::path_space::{Kind, PathMutations, PathSpace, Proposed, Target};
+use crate::path_space::{Kind, Lengths, PathMutations, PathSpace, Proposed, Target};
 use crate::paths::{Found, FullPath, Techniques, connect_visible};
 use crate::scene::{Caster, Scene};
 use rayon::prelude::*;
@@ -22,31 +22,23 @@ use std::collections::BTreeMap;
 /// Mutations for each independent sample that refines b.
 const REFINEMENT: usize = 16;
 
-/// Lengths of the paths that chains find, in edges.
-#[derive(Clone, Copy)]
-struct Lengths {
-    least: usize,
-    most: usize,
+/// How many lengths there are.
+fn count(lengths: Lengths) -> usize {
+    (lengths.most + 1).saturating_sub(lengths.least)
 }
 
-impl Lengths {
-    fn count(self) -> usize {
-        (self.most + 1).saturating_sub(self.least)
-    }
-
-    /// A path of any of the lengths and techniques, all as likely, left in `path`; with its contribution over density.
-    fn sample(
-        self,
-        scene: &Caster<'_>,
-        stream: &mut Stream,
-        path: &mut FullPath,
-        health: &mut Health,
-    ) -> Option<Found> {
-        let edges = self.least + (stream.number() * self.count() as f64) as usize;
-        let found = Tracer { edges }.sample(scene, stream, path, health)?;
-        let scale = self.count() as f64;
-        Some(Found { value: found.value * scale, luminance: found.luminance * scale, ..found })
-    }
+/// A path of any of the lengths and techniques, all as likely, left in `path`; with its contribution over density.
+fn sample(
+    lengths: Lengths,
+    scene: &Caster<'_>,
+    stream: &mut Stream,
+    path: &mut FullPath,
+    health: &mut Health,
+) -> Option<Found> {
+    let count = count(lengths) as f64;
+    let edges = lengths.least + (stream.number() * count) as usize;
+    let found = Tracer { edges }.sample(scene, stream, path, health)?;
+    Some(Found { value: found.value * count, luminance: found.luminance * count, ..found })
 }
 
 struct Chain {
@@ -83,6 +75,7 @@ pub(super) struct Mlt {
     lengths: Lengths,
     size: [usize; 2],
     mean: Mean,
+    worth: Worth,
     batches: u64,
     lanes: Vec<Lane>,
 }
@@ -91,13 +84,14 @@ impl Mlt {
     pub(super) fn start(scene: &Scene, settings: &Settings) -> Self {
         let direct = settings.mutations.traced_edges();
         let lengths = Lengths { least: direct + 1, most: settings.max_depth };
-        let target = Target::Path { least: lengths.least, most: lengths.most };
+        let target = Target::Path(lengths);
         Self {
             seed: settings.seed,
             direct: Path::up_to(settings, direct),
             lengths,
             size: scene.camera.size,
             mean: Mean::default(),
+            worth: Worth::default(),
             batches: 0,
             lanes: (0..LANES).map(|_| Lane::new(settings.mutations.path_space, target)).collect(),
         }
@@ -106,10 +100,10 @@ impl Mlt {
     /// Draws a batch of independent samples, and starts the chains if there are none and some sample finds light.
     fn sample(&mut self, scene: &Scene, samples: usize) -> u64 {
         let (seed, batch, lengths) = (self.seed, self.batches, self.lengths);
-        let stream = |sample: usize| Stream::new(seed, &[2, 0, batch, sample as u64]);
+        let stream = |number: usize| Stream::new(seed, &[2, 0, batch, number as u64]);
         let memory = || (FullPath::default(), Health::default());
-        let targets = independent(scene, samples, memory, |caster, (path, health), sample| {
-            lengths.sample(caster, &mut stream(sample), path, health).map_or(0.0, |found| found.luminance)
+        let targets = independent(scene, samples, memory, |caster, (path, health), number| {
+            sample(lengths, caster, &mut stream(number), path, health).map_or(0.0, |found| found.luminance)
         });
         self.batches += 1;
         targets.iter().for_each(|target| self.mean.add(*target));
@@ -128,14 +122,14 @@ impl Mlt {
 
     pub(super) fn pass(&mut self, scene: &Scene, film: &mut Film, pass: u64, counts: &mut Counts) {
         self.direct.pass(scene, film, pass, counts);
-        if self.lengths.count() == 0 {
+        if count(self.lengths) == 0 {
             return;
         }
         let pixels = self.size[0] * self.size[1];
         let samples = if self.mean.sum == 0.0 { batch_samples(self.size, self.batches) } else { pixels / REFINEMENT };
         let samples = self.sample(scene, samples);
         let mutations = if self.mean.sum > 0.0 { pixels as u64 } else { 0 };
-        let (kernel, size, worth) = (film.kernel.clone(), film.size, self.mean.mean());
+        let (kernel, size, worth) = (film.kernel.clone(), film.size, self.worth.next(self.mean.mean()));
         let run = |(number, lane): (usize, &mut Lane)| {
             lane.run(&Caster::new(scene), share(mutations, number, pass), worth, &kernel, size)
         };
@@ -172,7 +166,7 @@ impl Lane {
     /// Begins at the sample that `draws` gives.
     fn start(&mut self, scene: &Caster<'_>, lengths: Lengths, draws: &mut Stream, stream: Stream) {
         let mut path = FullPath::default();
-        let Some(found) = lengths.sample(scene, draws, &mut path, &mut self.health) else { return };
+        let Some(found) = sample(lengths, scene, draws, &mut path, &mut self.health) else { return };
         // Without the weight that its technique has among others.
         let (light, camera) = (&path.light.vertices, &path.camera.vertices);
         let Some(alone) = connect_visible(scene, light, camera, &Techniques::ALONE) else { return };

@@ -11,12 +11,12 @@
 //! Light seen directly is rendered by path tracing, and so is direct light unless the settings say otherwise.
 
 use super::bdpt::ROULETTE_FROM;
-use super::chains::{LANES, Mean, batch_samples, independent, share};
+use super::chains::{LANES, Mean, Worth, batch_samples, independent, share};
 use super::{Acceptance, ChainReport, Counts, path::Path, render::Settings};
 use crate::film::{Film, Health, Kernel, PathClass, Splats};
 use crate::markov::{ChainState, Mutations};
 use crate::math::{Discrete, Stream, Walk};
-use crate::paths::{FullPath, TECHNIQUES, connect, trace_camera, trace_light};
+use crate::paths::{FullPath, Open, TECHNIQUES, connect, trace_camera, trace_light};
 use crate::scene::{Caster, Scene};
 use crate::spectrum::Spectrum;
 use glam::DVec2;
@@ -69,7 +69,9 @@ pub(super) struct Pssmlt {
     direct: Path,
     lengths: Lengths,
     size: [usize; 2],
+    open: Open,
     mean: Mean,
+    worth: Worth,
     batches: u64,
     lanes: Vec<Lane>,
 }
@@ -90,7 +92,9 @@ impl Pssmlt {
             direct: Path::up_to(settings, direct),
             lengths: Lengths { least: direct + 1, most: settings.max_depth },
             size: scene.camera.size,
+            open: Open::of(scene),
             mean: Mean::default(),
+            worth: Worth::default(),
             batches: 0,
             lanes: (0..LANES).map(|_| Lane::default()).collect(),
         }
@@ -98,7 +102,8 @@ impl Pssmlt {
 
     /// A state none of whose rows has been drawn.
     fn state(&self) -> ChainState {
-        let rows = |walk| (0..=self.lengths.most).map(move |i| self.mutations.scales(walk, i, self.size, true));
+        let rows =
+            |walk| (0..=self.lengths.most).map(move |i| self.mutations.scales(walk, i, self.size, self.open, true));
         let scales: Vec<_> = rows(Walk::FromCamera).chain(rows(Walk::FromLight)).collect();
         ChainState::new(self.mutations.small_step, scales.into())
     }
@@ -138,7 +143,7 @@ impl Pssmlt {
         }
         let pixels = (self.size[0] * self.size[1]) as u64;
         let mutations = if self.mean.sum > 0.0 { pixels } else { 0 };
-        let (kernel, size, worth) = (film.kernel.clone(), film.size, self.mean.mean());
+        let (kernel, size, worth) = (film.kernel.clone(), film.size, self.worth.next(self.mean.mean()));
         let (lengths, large) = (self.lengths, self.mutations.large_step);
         let run = |(number, lane): (usize, &mut Lane)| {
             let mutations = share(mutations, number, pass);

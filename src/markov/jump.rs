@@ -90,9 +90,11 @@ fn invert(
     Some(())
 }
 
-/// Has the state's proposal lead to `path` by the technique that has found it. `None` where it cannot.
-pub fn retell(scene: &Scene, path: &FullPath, state: &mut ChainState, stream: &mut Stream) -> Option<()> {
+/// Has the state's proposal lead to `path` by the technique that has found it, where the state's is `from`. `None` where it
+/// cannot.
+pub fn retell(scene: &Scene, path: &FullPath, from: usize, state: &mut ChainState, stream: &mut Stream) -> Option<()> {
     let (tracer, s) = (Tracer { edges: path.edges() }, path.light.vertices.len());
+    forget(path, from, s, state, stream);
     for m in 0..s {
         state.set(tracer.light_rows() + m, path.light_row(scene, m, stream.row())?);
     }

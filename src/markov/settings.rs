@@ -3,7 +3,7 @@
 use super::SmallStep;
 use crate::math::{Row, Walk};
 use crate::path_space::{PathMutations, Radii};
-use crate::paths::{Use, uses};
+use crate::paths::{Open, Use, uses};
 use serde::{Deserialize, Serialize};
 
 /// How the technique jumps that keep the path come about.
@@ -150,9 +150,9 @@ impl Mutations {
 pub type Scales = Row;
 
 impl Mutations {
-    /// The scales of row `index` of a walk, for a film of `size`; `plays_roulette` says whether the last number decides
-    /// whether the walk goes on.
-    pub fn scales(&self, walk: Walk, index: usize, size: [usize; 2], plays_roulette: bool) -> Scales {
+    /// The scales of row `index` of a walk, for a film of `size` and what is `open`; `plays_roulette` says whether the last
+    /// number decides whether the walk goes on.
+    pub fn scales(&self, walk: Walk, index: usize, size: [usize; 2], open: Open, plays_roulette: bool) -> Scales {
         let [width, height] = size.map(|pixels| pixels as f64);
         let [x, y] = match self.film_steps {
             FilmSteps::Shares => [1.0, 1.0],
@@ -166,7 +166,7 @@ impl Mutations {
             Use::Discrete => f64::from(u8::from(!self.keep_choices)),
             Use::Unused => 0.0,
         };
-        let mut scales = uses(walk, index).map(scale);
+        let mut scales = uses(open, walk, index).map(scale);
         // Only scattering can be survived.
         let scatters = index > usize::from(walk == Walk::FromLight);
         if plays_roulette && scatters {
@@ -180,12 +180,14 @@ impl Mutations {
 mod tests {
     use super::*;
 
+    const ALL: Open = Open { lens: true, lobes: true };
+
     #[test]
     fn steps_on_the_film_are_as_long_along_both_sides() {
         let size = [160, 40];
         let along = |film_steps| {
             let mutations = Mutations { film_steps, ..Mutations::default() };
-            let [x, y, ..] = mutations.scales(Walk::FromCamera, 0, size, false);
+            let [x, y, ..] = mutations.scales(Walk::FromCamera, 0, size, ALL, false);
             [x * 160.0 * 0.01, y * 40.0 * 0.01]
         };
         assert_eq!(along(FilmSteps::Shares), [1.6, 0.4]);
@@ -199,10 +201,19 @@ mod tests {
     fn choices_are_kept_where_asked() {
         let free = Mutations::default();
         let kept = Mutations { keep_choices: true, ..free };
-        assert_eq!(free.scales(Walk::FromCamera, 2, [8, 8], false), [1.0, 1.0, 1.0, 0.0]);
-        assert_eq!(kept.scales(Walk::FromCamera, 2, [8, 8], false), [0.0, 1.0, 1.0, 0.0]);
-        assert_eq!(free.scales(Walk::FromLight, 2, [8, 8], true), [1.0, 1.0, 1.0, 1.0]);
-        assert_eq!(free.scales(Walk::FromLight, 1, [8, 8], true), [0.0, 1.0, 1.0, 0.0]);
+        assert_eq!(free.scales(Walk::FromCamera, 2, [8, 8], ALL, false), [1.0, 1.0, 1.0, 0.0]);
+        assert_eq!(kept.scales(Walk::FromCamera, 2, [8, 8], ALL, false), [0.0, 1.0, 1.0, 0.0]);
+        assert_eq!(free.scales(Walk::FromLight, 2, [8, 8], ALL, true), [1.0, 1.0, 1.0, 1.0]);
+        assert_eq!(free.scales(Walk::FromLight, 1, [8, 8], ALL, true), [0.0, 1.0, 1.0, 0.0]);
+    }
+
+    #[test]
+    fn numbers_that_nothing_reads_do_not_move() {
+        let (usual, none) = (Mutations::default(), Open { lens: false, lobes: false });
+        assert_eq!(usual.scales(Walk::FromCamera, 0, [8, 8], none, false), [1.0, 1.0, 0.0, 0.0]);
+        assert_eq!(usual.scales(Walk::FromCamera, 1, [8, 8], none, false), [0.0, 1.0, 1.0, 0.0]);
+        assert_eq!(usual.scales(Walk::FromLight, 0, [8, 8], none, false), [1.0, 1.0, 1.0, 0.0]);
+        assert_eq!(usual.scales(Walk::FromLight, 2, [8, 8], none, true), [0.0, 1.0, 1.0, 1.0]);
     }
 
     #[test]

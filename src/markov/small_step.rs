@@ -68,12 +68,11 @@ impl SmallStep {
         }
     }
 
-    /// Moves the numbers of a row, each as far as its scale says.
+    /// `row` after `steps` steps, in which each number moves as far as its scale says.
     #[inline]
-    pub fn move_row(&self, row: &mut Row, scales: &Scales, steps: u64, stream: &mut Stream) {
-        for (number, scale) in row.iter_mut().zip(scales).filter(|(_, scale)| **scale > 0.0) {
-            *number = self.moved(*number, *scale, steps, stream);
-        }
+    pub fn moved_row(&self, row: Row, scales: &Scales, steps: u64, stream: &mut Stream) -> Row {
+        let mut moved = |i: usize| if scales[i] > 0.0 { self.moved(row[i], scales[i], steps, stream) } else { row[i] };
+        [moved(0), moved(1), moved(2), moved(3)]
     }
 
     /// Density with which one step leads from `a` to `b`.

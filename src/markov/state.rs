@@ -78,17 +78,17 @@ impl ChainState {
     #[inline]
     pub fn row(&mut self, index: usize, stream: &mut Stream) -> Row {
         let slot = &mut self.slots[index];
-        if slot.updated < self.step {
-            self.changed.push((index, *slot));
-            if self.large || slot.updated < self.last_large || slot.updated == 0 {
-                slot.row = stream.row();
-            } else {
-                let steps = self.step - slot.updated;
-                self.small_step.move_row(&mut slot.row, &self.scales[index], steps, stream);
-            }
-            slot.updated = self.step;
+        if slot.updated == self.step {
+            return slot.row;
         }
-        slot.row
+        self.changed.push((index, *slot));
+        let row = if self.large || slot.updated < self.last_large || slot.updated == 0 {
+            stream.row()
+        } else {
+            self.small_step.moved_row(slot.row, &self.scales[index], self.step - slot.updated, stream)
+        };
+        *slot = Slot { row, updated: self.step };
+        row
     }
 
     /// Row `index` as it was last read or set.

@@ -19,16 +19,11 @@ use glam::DVec3;
 
 /// How long paths may become, in edges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Lengths {
-    /// As long as they are.
-    Same,
-    /// Within bounds.
-    Between {
-        /// The shortest.
-        least: usize,
-        /// The longest.
-        most: usize,
-    },
+pub struct Lengths {
+    /// The shortest.
+    pub least: usize,
+    /// The longest.
+    pub most: usize,
 }
 
 /// A part of a path: the vertices from `from` up to `to`, of a path with `edges` edges.
@@ -40,6 +35,15 @@ pub(super) struct Range {
 }
 
 impl Range {
+    pub(super) const fn new(from: usize, to: usize, edges: usize) -> Self {
+        Self { from, to, edges }
+    }
+
+    /// What it becomes with `count` vertices in its place.
+    const fn replaced(self, count: usize) -> Self {
+        Self { from: self.from, to: self.from + count, edges: self.edges + count - self.len() }
+    }
+
     /// Its vertices.
     const fn len(self) -> usize {
         self.to - self.from
@@ -82,7 +86,7 @@ fn worth_in_place(old: usize, new: usize) -> f64 {
 impl Lengths {
     /// The parts that may be left out of a path, with their worth.
     fn parts(self, edges: usize) -> impl Iterator<Item = (Range, f64)> + Clone {
-        let fewest = usize::from(self == Self::Same);
+        let fewest = usize::from(self.least == self.most);
         let of_size = move |vertices: usize| {
             // Nothing can be left out beyond the ends.
             let first = usize::from(vertices == 0);
@@ -99,10 +103,7 @@ impl Lengths {
     /// The numbers of vertices that may take the place of a part, with their worth.
     fn replacements(self, part: Range) -> impl Iterator<Item = (usize, f64)> + Clone {
         let kept = part.edges + 1 - part.len();
-        let (least, most) = match self {
-            Self::Same => (part.len(), part.len()),
-            Self::Between { least, most } => ((least + 1).saturating_sub(kept), (most + 1).saturating_sub(kept)),
-        };
+        let [least, most] = [self.least, self.most].map(|edges| (edges + 1).saturating_sub(kept));
         (least.max(part.least())..=most).map(move |new| (new, worth_in_place(part.len(), new)))
     }
 
@@ -136,7 +137,27 @@ pub(super) fn propose(
     let replacements = lengths.replacements(part);
     let chosen = pick(replacements.clone().map(|(_, worth)| worth), stream.number())?;
     let (count, _) = replacements.clone().nth(chosen)?;
-    let replaced = Range { from: part.from, to: part.from + count, edges: edges + count - part.len() };
+    let technique = resample(scene, old, part, count, stream, new)?;
+    let replaced = part.replaced(count);
+    let ratio = if replaced == part {
+        1.0
+    } else {
+        lengths.probability(replaced, part.len()) / lengths.probability(part, replaced.len()) * replaced.count()
+            / part.count()
+    };
+    Some(Draft { technique, ratio, ranges: Some([part, replaced]), linked: None })
+}
+
+/// Has `count` vertices take the place of `part`: the technique that found them.
+pub(super) fn resample(
+    scene: &Caster<'_>,
+    old: &Course,
+    part: Range,
+    count: usize,
+    stream: &mut Stream,
+    new: &mut Course,
+) -> Option<usize> {
+    let (edges, replaced) = (old.edges(), part.replaced(count));
     let technique = part.from + ((stream.number() * replaced.count()) as usize).min(count);
 
     (new.film, new.lit) = (old.film, old.lit.filter(|_| part.from > 0));
@@ -162,14 +183,7 @@ pub(super) fn propose(
             return None;
         }
     }
-    let ratio = match lengths {
-        Lengths::Same => 1.0,
-        Lengths::Between { .. } => {
-            lengths.probability(replaced, part.len()) / lengths.probability(part, replaced.len()) * replaced.count()
-                / part.count()
-        }
-    };
-    Some(Draft { technique, ratio, ranges: Some([part, replaced]) })
+    Some(technique)
 }
 
 /// A walk that goes on.

@@ -28,7 +28,7 @@
 //!
 //! where all weights are one for a chain that has no techniques.
 //!
-//! A mutation is drawn evenly among those that suit the path, so that T has their number, too. Perturbations keep which
+//! A mutation is drawn by its weight among those that suit the path, so that T has the sum of their weights, too. Perturbations keep which
 //! vertices scatter by delta lobes and how; both ways have the same choice. Only [`bidirectional`] changes them.
 //!
 //! [`offset_density`]: crate::manifold::offset_density
@@ -37,6 +37,8 @@
 
 mod bidirectional;
 mod caustic;
+mod connection;
+mod gains;
 mod gamma;
 mod lens;
 mod link;
@@ -47,13 +49,13 @@ mod retrace;
 mod steps;
 
 pub use bidirectional::Lengths;
+pub use gains::{Gain, Weights, way};
 pub use steps::Radii;
 
 use crate::manifold::Rejection;
-use crate::math::{Stream, Walk};
+use crate::math::{Stream, Walk, pick};
 use crate::paths::{Course, Found, FullPath, Node, TECHNIQUES, Techniques, connect_visible};
 use crate::scene::{Caster, Scene};
-use arrayvec::ArrayVec;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -71,11 +73,14 @@ pub enum Kind {
     MultiChain,
     /// A vertex moves, and a chain follows.
     Manifold,
+    /// A vertex is connected with a light through smooth boundaries.
+    Connection,
 }
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::Bidirectional, Self::Lens, Self::Caustic, Self::MultiChain, Self::Manifold];
+    pub const ALL: [Self; 6] =
+        [Self::Bidirectional, Self::Lens, Self::Caustic, Self::MultiChain, Self::Manifold, Self::Connection];
 
     /// The name, as reports have it.
     pub const fn name(self) -> &'static str {
@@ -85,6 +90,7 @@ impl Kind {
             Self::Caustic => "caustic_perturbation",
             Self::MultiChain => "multi_chain_perturbation",
             Self::Manifold => "manifold_perturbation",
+            Self::Connection => "manifold_connection",
         }
     }
 }
@@ -137,20 +143,20 @@ pub enum Target {
     /// w_s f of paths of one length, times the number of techniques, with a technique that stays.
     Technique,
     /// f of paths of these lengths, in edges.
-    Path {
-        /// The shortest.
-        least: usize,
-        /// The longest.
-        most: usize,
-    },
+    Path(Lengths),
 }
 
 impl Target {
     const fn techniques(self) -> Techniques {
         match self {
             Self::Technique => TECHNIQUES,
-            Self::Path { .. } => Techniques::ALONE,
+            Self::Path(_) => Techniques::ALONE,
         }
+    }
+
+    /// What the contribution of a technique is multiplied by.
+    fn count(self, course: &Course) -> f64 {
+        if self == Self::Technique { (course.edges() + 1) as f64 } else { 1.0 }
     }
 }
 
@@ -204,6 +210,8 @@ struct Draft {
     ratio: f64,
     /// For paths that were sampled anew: the techniques that would sample the same, of the old path and of the new one.
     ranges: Option<[bidirectional::Range; 2]>,
+    /// The vertex that was linked with a light over a manifold, or might have been.
+    linked: Option<usize>,
 }
 
 /// A proposal.
@@ -219,18 +227,32 @@ pub struct Proposed {
 #[derive(Debug)]
 pub struct PathSpace {
     mutations: PathMutations,
+    /// How often each is drawn.
+    pub weights: Weights,
     target: Target,
     old: Course,
     new: Course,
     plans: Vec<Plan>,
     densities: Vec<f64>,
+    /// A path as the walk from the camera finds it.
+    walked: FullPath,
 }
 
 impl PathSpace {
     /// No path is known yet.
     pub fn new(mutations: PathMutations, target: Target) -> Self {
         let (old, new) = (Course::default(), Course::default());
-        Self { mutations, target, old, new, plans: Vec::new(), densities: Vec::new() }
+        let weights = Weights::even(mutations.kinds);
+        Self {
+            mutations,
+            weights,
+            target,
+            old,
+            new,
+            plans: Vec::new(),
+            densities: Vec::new(),
+            walked: FullPath::default(),
+        }
     }
 
     /// Mutates `path`, which contributes `current`; the new path is left in `proposal`.
@@ -246,18 +268,21 @@ impl PathSpace {
         }
         let view = View { scene, technique: path.light.vertices.len(), mutations: self.mutations };
         view.mark(&mut self.old);
-        let kinds = self.mutations.kinds;
-        let suitable = suitable(kinds, scene, &self.old, &mut self.plans);
-        let number = (stream.number() * suitable.len() as f64) as usize;
-        let Some(&kind) = suitable.get(number) else {
+        let weights = suitable(&self.weights, scene, &self.old, &mut self.plans);
+        let Some(kind) = pick(weights.into_iter(), stream.number()).map(|index| Kind::ALL[index]) else {
             return Proposed { kind: None, outcome: Err(Rejection::Unsuitable) };
         };
         let outcome = self.mutate(kind, &view, stream).and_then(|draft| {
-            let found = self.judge(scene, &draft, (path, current), proposal).ok_or(Rejection::Dark)?;
+            let found = match draft.linked {
+                Some(d) => self.judge_linked(&view, (&draft, d), (path, current), stream, proposal),
+                None => self.judge(scene, &draft, (path, current), proposal),
+            };
+            let found = found.ok_or(Rejection::Dark)?;
             let choice = match kind {
-                Kind::Bidirectional => {
+                Kind::Bidirectional | Kind::Connection => {
                     view.mark(&mut self.new);
-                    suitable.len() as f64 / self::suitable(kinds, scene, &self.new, &mut self.plans).len() as f64
+                    let new = suitable(&self.weights, scene, &self.new, &mut self.plans);
+                    weights.iter().sum::<f64>() / new.iter().sum::<f64>()
                 }
                 _ => 1.0,
             };
@@ -272,8 +297,8 @@ impl PathSpace {
         let View { scene, technique, .. } = *view;
         if kind == Kind::Bidirectional {
             let lengths = match self.target {
-                Target::Technique => Lengths::Same,
-                Target::Path { least, most } => Lengths::Between { least, most },
+                Target::Technique => Lengths { least: old.edges(), most: old.edges() },
+                Target::Path(lengths) => lengths,
             };
             let mut draft = bidirectional::propose(scene, old, lengths, stream, new).ok_or(Rejection::Dark)?;
             if self.target == Target::Technique {
@@ -281,12 +306,15 @@ impl PathSpace {
             }
             return Ok(draft);
         }
+        if kind == Kind::Connection {
+            return connection::propose(view, old, stream, new);
+        }
         plans.clear();
         plan(kind, scene, old, plans);
         let number = (stream.number() * plans.len() as f64) as usize;
         let plan = plans.get(number).ok_or(Rejection::Unsuitable)?;
         let ratio = perturb::propose(view, old, plan, stream, new)?;
-        Ok(Draft { technique, ratio, ranges: None })
+        Ok(Draft { technique, ratio, ranges: None, linked: None })
     }
 
     /// What the new course contributes, and the acceptance; `None` where it carries no light.
@@ -298,21 +326,7 @@ impl PathSpace {
         proposal: &mut FullPath,
     ) -> Option<(Found, f64)> {
         let Self { new, densities, target, .. } = self;
-        proposal.assemble(scene, new, draft.technique)?;
-        let (light, camera) = (&proposal.light.vertices, &proposal.camera.vertices);
-        let connection = connect_visible(scene, light, camera, &target.techniques())?;
-        let count = if *target == Target::Technique { (new.edges() + 1) as f64 } else { 1.0 };
-        let value = connection.value * count;
-        let luminance = value.luminance();
-        // Of a path that a technique can hardly find the contribution may be beyond numbers: it is no proposal.
-        if !(value.is_valid() && luminance > 0.0) {
-            return None;
-        }
-        proposal.film = connection.film.unwrap_or(proposal.film);
-        new.film = proposal.film;
-        proposal.junction = connection.junction;
-        let (film, technique) = (proposal.film, draft.technique);
-        let found = Found { value, luminance, class: connection.class, film, technique };
+        let found = realise(scene, new, draft.technique, (&target.techniques(), target.count(new)), proposal)?;
         // The density of both paths, as far as T leaves something of it.
         let mut density = |path: &FullPath, which: usize| match draft.ranges {
             None => path.density(),
@@ -321,31 +335,93 @@ impl PathSpace {
                 1.0 / densities[ranges[which].techniques()].iter().sum::<f64>()
             }
         };
-        let ratio = luminance / current.luminance * density(proposal, 1) / density(path, 0) * draft.ratio;
+        let ratio = found.luminance / current.luminance * density(proposal, 1) / density(path, 0) * draft.ratio;
         // Neither infinite nor NaN: a path whose density is none at all was not found by this technique.
+        (ratio.is_finite()).then_some((found, ratio))
+    }
+
+    /// [`PathSpace::judge`], for a path whose light's end was replaced below x_d. It may take another technique: one is drawn
+    /// by the weights, as jumps do, so that the acceptance has f in place of C.
+    fn judge_linked(
+        &mut self,
+        view: &View<'_>,
+        (draft, d): (&Draft, usize),
+        (path, current): (&FullPath, &Found),
+        stream: &mut Stream,
+        proposal: &mut FullPath,
+    ) -> Option<(Found, f64)> {
+        let Self { old, new, densities, target, walked, .. } = self;
+        let heuristic = target.techniques().heuristic;
+        let weight = |densities: &[f64], technique: usize| {
+            let Some(heuristic) = heuristic else { return 1.0 };
+            heuristic.apply(densities[technique])
+                / densities.iter().map(|density| heuristic.apply(*density)).sum::<f64>()
+        };
+        // The density of the mutation in units of that of the technique, but for what stays.
+        let mut density = |course: &Course, densities: &[f64]| {
+            let sampled = densities[..=d].iter().sum::<f64>();
+            sampled + (d + 1) as f64 * densities[0] * connection::share(view, course, d, walked)
+        };
+        path.densities(densities);
+        let alone = current.luminance / (target.count(old) * weight(densities, current.technique));
+        let before = alone / density(old, densities);
+
+        let mut found = realise(view.scene, new, draft.technique, (&Techniques::ALONE, 1.0), proposal)?;
+        proposal.densities(densities);
+        let ratio = found.luminance / density(new, densities) / before;
+        if let Some(heuristic) = heuristic {
+            let weights = densities.iter().map(|density| heuristic.apply(*density));
+            let technique = pick(weights, stream.number())?;
+            found = realise(view.scene, new, technique, (&target.techniques(), target.count(new)), proposal)?;
+        }
         (ratio.is_finite()).then_some((found, ratio))
     }
 }
 
-/// Those of the mutations that suit a course.
-fn suitable(
-    kinds: Kinds,
+/// What `course` contributes by a technique, times `count`, with the path as that finds it; `None` where that is nothing.
+fn realise(
     scene: &Caster<'_>,
-    course: &Course,
-    plans: &mut Vec<Plan>,
-) -> ArrayVec<Kind, { Kind::ALL.len() }> {
-    let mut suits = |kind: &Kind| {
-        plans.clear();
-        plan(*kind, scene, course, plans);
-        *kind == Kind::Bidirectional || !plans.is_empty()
-    };
-    Kind::ALL.into_iter().filter(|kind| kinds.has(*kind) && suits(kind)).collect()
+    course: &mut Course,
+    technique: usize,
+    (techniques, count): (&Techniques, f64),
+    path: &mut FullPath,
+) -> Option<Found> {
+    path.assemble(scene, course, technique)?;
+    let connection = connect_visible(scene, &path.light.vertices, &path.camera.vertices, techniques)?;
+    let value = connection.value * count;
+    let luminance = value.luminance();
+    // Of a path that a technique can hardly find the contribution may be beyond numbers: it is no proposal.
+    if !(value.is_valid() && luminance > 0.0) {
+        return None;
+    }
+    path.film = connection.film.unwrap_or(path.film);
+    course.film = path.film;
+    path.junction = connection.junction;
+    Some(Found { value, luminance, class: connection.class, film: path.film, technique })
+}
+
+/// The weights of the mutations that suit a course, 0 for others.
+fn suitable(weights: &Weights, scene: &Caster<'_>, course: &Course, plans: &mut Vec<Plan>) -> [f64; Kind::ALL.len()] {
+    Kind::ALL.map(|kind| {
+        let weight = weights.get(kind);
+        let suits = weight > 0.0
+            && match kind {
+                Kind::Bidirectional => true,
+                Kind::Connection => connection::suits(scene, course),
+                _ => {
+                    plans.clear();
+                    plan(kind, scene, course, plans);
+                    !plans.is_empty()
+                }
+            };
+        if suits { weight } else { 0.0 }
+    })
 }
 
 /// Adds the ways in which a perturbation may move a path.
 fn plan(kind: Kind, scene: &Caster<'_>, course: &Course, plans: &mut Vec<Plan>) {
     match kind {
-        Kind::Bidirectional => {}
+        Kind::Bidirectional | Kind::Connection => {}
         Kind::Lens => plans.extend(lens::plan(course)),
         Kind::Caustic => plans.extend(caustic::plan(course)),
         Kind::MultiChain => plans.extend(multi_chain::plan(course)),

@@ -42,6 +42,11 @@ impl FullPath {
         if m < s { &self.light.vertices[m] } else { &self.camera.vertices[self.edges() - m] }
     }
 
+    /// Where x_m is; of no meaning at infinity.
+    pub fn position(&self, m: usize) -> DVec3 {
+        self.vertex(m).position
+    }
+
     /// The light that x_0 lies on, and where.
     pub(super) fn start(&self) -> Option<(EmitterId, Start)> {
         let vertex = self.vertex(0);

@@ -22,6 +22,6 @@ pub use found::{Found, TECHNIQUES};
 pub use full::{Event, FullPath};
 pub use merge::merge;
 pub use mis::{Heuristic, Junction, Techniques};
-pub use rows::{Random, Rows, Use, uses};
+pub use rows::{Open, Random, Rows, Use, uses};
 pub use subpath::{Subpath, Vertex, VertexKind};
 pub use trace::{light_vertex, light_vertex_for, shading_correction, trace_camera, trace_light};

@@ -5,6 +5,7 @@
 //! survival). Light subpath: row 0 is the choice of the light and the point on it, row 1 the direction from there (for
 //! an infinite light the point on the disk), row i + 1 the scattering at vertex i.
 
+use crate::bsdf::Bsdf;
 use crate::math::{Row, Stream, Walk};
 use crate::scene::{Scene, Surface};
 use glam::DVec3;
@@ -24,14 +25,33 @@ pub enum Use {
     Unused,
 }
 
+/// What a scene has rows decide. Numbers that would decide anything else are never read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Open {
+    /// The point of the lens.
+    pub lens: bool,
+    /// The lobe by which a surface scatters.
+    pub lobes: bool,
+}
+
+impl Open {
+    /// What `scene` has rows decide.
+    pub fn of(scene: &Scene) -> Self {
+        Self { lens: scene.camera.has_lens(), lobes: scene.bsdfs().iter().any(Bsdf::chooses) }
+    }
+}
+
 /// What the numbers of row `index` of a walk are for, where no Russian roulette is played. A light's triangle is chosen by
 /// what also places the point within it, which counts as continuous.
-pub fn uses(walk: Walk, index: usize) -> [Use; 4] {
+pub fn uses(open: Open, walk: Walk, index: usize) -> [Use; 4] {
     use Use::{Continuous, Discrete, FilmX, FilmY, Unused};
+    let lens = if open.lens { Continuous } else { Unused };
+    let lobe = if open.lobes { Discrete } else { Unused };
     match (walk, index) {
-        (Walk::FromCamera, 0) => [FilmX, FilmY, Continuous, Continuous],
+        (Walk::FromCamera, 0) => [FilmX, FilmY, lens, lens],
+        (Walk::FromLight, 0) => [Discrete, Continuous, Continuous, Unused],
         (Walk::FromLight, 1) => [Unused, Continuous, Continuous, Unused],
-        _ => [Discrete, Continuous, Continuous, Unused],
+        _ => [lobe, Continuous, Continuous, Unused],
     }
 }
 

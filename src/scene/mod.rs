@@ -201,6 +201,12 @@ impl Scene {
         self.bsdfs.iter().any(|bsdf| [DVec3::Z, -DVec3::Z].iter().any(|wi| bsdf.gathers(*wi)))
     }
 
+    /// Whether there are smooth boundaries that bend light.
+    pub fn refracts(&self) -> bool {
+        let smooth = |bsdf: &Bsdf| [DVec3::Z, -DVec3::Z].iter().any(|wi| bsdf.is_delta(*wi));
+        self.bsdfs.iter().any(|bsdf| bsdf.refractive_index().is_some() && smooth(bsdf))
+    }
+
     /// All scattering models.
     pub fn bsdfs(&self) -> &[Bsdf] {
         &self.bsdfs

@@ -7,13 +7,13 @@ use crate::markov::{
     ChainState, ControlledMemory, Jump, JumpMemory, Jumps, Mutations, Tracer, Tries, controlled_step, jump, retell,
 };
 use crate::math::Stream;
-use crate::path_space::{Kind, PathSpace, Proposed, Target};
+use crate::path_space::{Gain, Kind, PathSpace, Proposed, Target, way};
 use crate::paths::{Found, FullPath};
 use crate::scene::{Caster, Scene};
 use std::collections::BTreeMap;
 
 /// Names of the tallies.
-pub(super) const KINDS: [&str; 8] = [
+pub(super) const KINDS: [&str; 9] = [
     "large_step",
     "small_step",
     "technique_change",
@@ -22,17 +22,19 @@ pub(super) const KINDS: [&str; 8] = [
     Kind::ALL[2].name(),
     Kind::ALL[3].name(),
     Kind::ALL[4].name(),
+    Kind::ALL[5].name(),
 ];
 const LARGE: usize = 0;
 const SMALL: usize = 1;
 const CHANGE: usize = 2;
 /// The first of the mutations in path space.
-const PATH: usize = 3;
+pub(super) const PATH: usize = 3;
 
 /// How far the target may be off, relative to itself, after the way to rows and back.
 const ROUND_TRIP: f64 = 1e-6;
 
 /// One chain.
+#[derive(Clone)]
 pub(super) struct Chain {
     state: ChainState,
     stream: Stream,
@@ -62,6 +64,14 @@ impl Chain {
     }
 }
 
+/// What mutations bring, by their kind as in [`KINDS`].
+#[derive(Clone, Copy, Default)]
+pub(super) struct Pilot {
+    pub gains: [Gain; KINDS.len()],
+    /// Rays cast when the last mutation ended.
+    rays: u64,
+}
+
 /// What a lane made in one pass.
 pub(super) struct Job {
     pub splats: Splats,
@@ -83,6 +93,8 @@ pub(super) struct Lane {
     jumps: JumpMemory,
     controlled: ControlledMemory,
     path_space: PathSpace,
+    /// Whether it is a pilot run.
+    pilot: Option<Pilot>,
     /// What the rows of a path lead to.
     returned: FullPath,
 }
@@ -102,7 +114,7 @@ struct Work<'a> {
 impl Work<'_> {
     #[inline]
     fn splat(&mut self, path: &Found, weight: f64) {
-        if weight > 0.0 {
+        if weight * self.worth > 0.0 {
             self.splats.add(self.kernel, path.film, path.class, path.value * (weight * self.worth / path.luminance));
         }
     }
@@ -120,6 +132,7 @@ impl Lane {
             jumps: JumpMemory::default(),
             controlled: ControlledMemory::default(),
             path_space: PathSpace::new(mutations.path_space, Target::Technique),
+            pilot: None,
             returned: FullPath::default(),
         }
     }
@@ -153,7 +166,8 @@ impl Lane {
         let (caster, mut splats) = (Caster::new(scene), Splats::new(size));
         let mut chains = std::mem::take(&mut self.chains);
         let run = |(chain, share): (&mut Option<Chain>, &Share)| {
-            let Share { tracer, worth, mutations } = *share;
+            let Share { tracer, worth, mutations, weights } = *share;
+            self.path_space.weights = weights;
             let (scene, splats) = (&caster, &mut splats);
             let mut work = Work { scene, tracer, kernel, splats, worth, large_steps: Mean::default() };
             if let Some(chain) = chain {
@@ -167,6 +181,28 @@ impl Lane {
         let large_steps = chains.iter_mut().zip(plan).map(run).collect();
         self.chains = chains;
         Job { splats, rays: caster.rays(), large_steps, health: std::mem::take(&mut self.health) }
+    }
+
+    /// What the mutations of a chain bring, a copy of which makes `mutations` of them.
+    pub(super) fn pilot(
+        &mut self,
+        scene: &Scene,
+        kernel: &Kernel,
+        size: [usize; 2],
+        (index, tracer): (usize, Tracer),
+        (mutations, stream): (u64, Stream),
+    ) -> Pilot {
+        let Some(chain) = &self.chains[index] else { return Pilot::default() };
+        let mut chain = Chain { stream, ..chain.clone() };
+        let (caster, mut splats) = (Caster::new(scene), Splats::new(size));
+        let (scene, splats) = (&caster, &mut splats);
+        let mut work = Work { scene, tracer, kernel, splats, worth: 0.0, large_steps: Mean::default() };
+        self.pilot = Some(Pilot::default());
+        for _ in 0..mutations {
+            self.mutate(&mut chain, &mut work);
+        }
+        self.health = Health::default();
+        self.pilot.take().unwrap_or_default()
     }
 
     /// One mutation; both states count with their expected weight.
@@ -190,10 +226,15 @@ impl Lane {
                 return;
             }
         }
-        if self.family == Family::Fused && chain.stream.number() < self.mutations.path_step {
+        if self.family == Family::Fused && chain.stream.number() < self.path_share() {
             return self.path_step(chain, work);
         }
         self.small_step(chain, work);
+    }
+
+    /// Share of the small steps in whose place paths move in path space; in a pilot run many do.
+    fn path_share(&self) -> f64 {
+        if self.pilot.is_some() { 0.5 } else { self.mutations.path_step }
     }
 
     /// Another technique for the same path.
@@ -255,7 +296,7 @@ impl Lane {
         state.propose(false);
         let mut reject = |cause: &'static str| *rejections.entry(cause).or_default() += 1;
         let mut judged = match outcome {
-            Ok(_) if retell(scene, proposal, state, stream).is_none() => {
+            Ok(_) if retell(scene, proposal, current.technique, state, stream).is_none() => {
                 reject("inversion");
                 None
             }
@@ -315,6 +356,11 @@ impl Lane {
     ) -> bool {
         let acceptance = if proposal.is_some() { ratio.min(1.0) } else { 0.0 };
         chain.weight += 1.0 - acceptance;
+        if let Some(pilot) = &mut self.pilot {
+            let rays = work.scene.rays();
+            let way = if acceptance > 0.0 { way(work.scene, &chain.path, &self.proposal) } else { 0.0 };
+            pilot.gains[kind].add(acceptance * way, rays - std::mem::replace(&mut pilot.rays, rays));
+        }
         let accepted = chain.stream.number() < acceptance;
         chain.tally(kind, accepted);
         let Some(found) = proposal else {

@@ -12,12 +12,13 @@
 
 mod lane;
 
-use super::chains::{LANES, Mean, batch_samples, independent, share};
+use super::chains::{LANES, Mean, Worth, batch_samples, independent, share};
 use super::{Acceptance, ChainReport, Counts, path::Path, render::Settings};
-use crate::film::{Film, Splats};
+use crate::film::{Film, Kernel, Splats};
 use crate::markov::{ChainState, Mutations, Scales, Tracer};
 use crate::math::{Discrete, Stream, Walk};
-use crate::path_space::Kind;
+use crate::path_space::{Gain, Kind, Weights};
+use crate::paths::Open;
 use crate::scene::{Caster, Scene};
 use lane::{Chain, Job, Lane};
 use rayon::prelude::*;
@@ -41,6 +42,9 @@ struct Length {
     mean: Mean,
     /// Batches of independent samples drawn.
     batches: u64,
+    worth: Worth,
+    /// How often each mutation in path space is drawn.
+    weights: Weights,
 }
 
 /// What a pass does with one length.
@@ -48,13 +52,16 @@ struct Share {
     tracer: Tracer,
     /// Mutations by all lanes together; 0 for a length in which no light has been found yet.
     mutations: u64,
-    /// What one of them is worth: b_k over their number, in units of a pixel's mean.
+    /// What one of them is worth: the pass's part of b_k over their number, in units of a pixel's mean.
     worth: f64,
+    /// How often each mutation in path space is drawn.
+    weights: Weights,
 }
 
 /// The method with its chains.
 pub(super) struct Mmlt {
     seed: u64,
+    family: Family,
     mutations: Mutations,
     direct: Path,
     size: [usize; 2],
@@ -66,16 +73,18 @@ impl Mmlt {
     pub(super) fn start(scene: &Scene, settings: &Settings, family: Family) -> Self {
         let mutations = settings.mutations;
         let direct = mutations.traced_edges();
-        let size = scene.camera.size;
+        let (size, open) = (scene.camera.size, Open::of(scene));
         let lengths: Vec<Length> = (direct + 1..=settings.max_depth)
             .map(|edges| {
                 let tracer = Tracer { edges };
-                let scales = scales(tracer, &mutations, size);
-                Length { tracer, scales, mean: Mean::default(), batches: 0 }
+                let scales = scales(tracer, &mutations, size, open);
+                let weights = Weights::even(mutations.path_space.kinds);
+                Length { tracer, scales, mean: Mean::default(), batches: 0, worth: Worth::default(), weights }
             })
             .collect();
         Self {
             seed: settings.seed,
+            family,
             mutations,
             direct: Path::up_to(settings, direct),
             size,
@@ -113,15 +122,35 @@ impl Mmlt {
         }
     }
 
-    /// How this pass divides one mutation per pixel among the lengths: in proportion to their light.
-    fn plan(&self, pixels: f64) -> Vec<Share> {
+    /// Finds how often paths had better move how, by a run whose chains are thrown away.
+    fn adapt(&mut self, scene: &Scene, kernel: &Kernel, index: usize) {
+        let (seed, size, kinds) = (self.seed, self.size, self.mutations.path_space.kinds);
+        let mutations = (batch_samples(size, 0) / (self.lengths.len() * LANES)) as u64;
+        let length = &mut self.lengths[index];
+        let tracer = length.tracer;
+        let run = |(number, lane): (usize, &mut Lane)| {
+            let stream = Stream::new(seed, &[5, tracer.edges as u64, number as u64]);
+            lane.pilot(scene, kernel, size, (index, tracer), (mutations, stream)).gains
+        };
+        let runs: Vec<_> = self.lanes.par_iter_mut().enumerate().map(run).collect();
+        let mut gains = [Gain::default(); lane::KINDS.len()];
+        for run in &runs {
+            gains.iter_mut().zip(run).for_each(|(gain, other)| gain.merge(other));
+        }
+        let path = std::array::from_fn(|kind| gains[lane::PATH + kind]);
+        length.weights = Weights::of(kinds, &path);
+    }
+
+    /// How a pass divides one mutation per pixel among the lengths: in proportion to their light.
+    fn plan(&mut self, pixels: f64) -> Vec<Share> {
         let total: f64 = self.lengths.iter().map(|length| length.mean.mean()).sum();
-        let part = |length: &Length| {
+        let part = |length: &mut Length| {
             let b = length.mean.mean();
             let mutations = if b > 0.0 { (b / total * pixels).ceil() } else { 0.0 };
-            Share { tracer: length.tracer, mutations: mutations as u64, worth: b * pixels / mutations.max(1.0) }
+            let worth = length.worth.next(b) * pixels / mutations.max(1.0);
+            Share { tracer: length.tracer, mutations: mutations as u64, worth, weights: length.weights }
         };
-        self.lengths.iter().map(part).collect()
+        self.lengths.iter_mut().map(part).collect()
     }
 
     pub(super) fn pass(&mut self, scene: &Scene, film: &mut Film, pass: u64, counts: &mut Counts) {
@@ -129,6 +158,9 @@ impl Mmlt {
         for index in 0..self.lengths.len() {
             if self.lengths[index].mean.sum == 0.0 {
                 self.explore(scene, index);
+                if self.family == Family::Fused {
+                    self.adapt(scene, &film.kernel, index);
+                }
             }
         }
         let (kernel, size) = (film.kernel.clone(), film.size);
@@ -181,9 +213,9 @@ impl Mmlt {
 }
 
 /// How far the numbers of each row of a state move.
-fn scales(tracer: Tracer, mutations: &Mutations, size: [usize; 2]) -> Arc<[Scales]> {
+fn scales(tracer: Tracer, mutations: &Mutations, size: [usize; 2], open: Open) -> Arc<[Scales]> {
     let technique = [1.0, 0.0, 0.0, 0.0];
-    let walk = |walk| (0..=tracer.edges).map(move |index| mutations.scales(walk, index, size, false));
+    let walk = |walk| (0..=tracer.edges).map(move |index| mutations.scales(walk, index, size, open, false));
     let rows = std::iter::once(technique).chain(walk(Walk::FromCamera)).chain(walk(Walk::FromLight));
     rows.collect()
 }
