@@ -22,11 +22,6 @@ use std::collections::BTreeMap;
 /// Mutations for each independent sample that refines b.
 const REFINEMENT: usize = 16;
 
-/// How many lengths there are.
-fn count(lengths: Lengths) -> usize {
-    (lengths.most + 1).saturating_sub(lengths.least)
-}
-
 /// A path of any of the lengths and techniques, all as likely, left in `path`; with its contribution over density.
 fn sample(
     lengths: Lengths,
@@ -35,7 +30,7 @@ fn sample(
     path: &mut FullPath,
     health: &mut Health,
 ) -> Option<Found> {
-    let count = count(lengths) as f64;
+    let count = lengths.count() as f64;
     let edges = lengths.least + (stream.number() * count) as usize;
     let found = Tracer { edges }.sample(scene, stream, path, health)?;
     Some(Found { value: found.value * count, luminance: found.luminance * count, ..found })
@@ -122,7 +117,7 @@ impl Mlt {
 
     pub(super) fn pass(&mut self, scene: &Scene, film: &mut Film, pass: u64, counts: &mut Counts) {
         self.direct.pass(scene, film, pass, counts);
-        if count(self.lengths) == 0 {
+        if self.lengths.count() == 0 {
             return;
         }
         let pixels = self.size[0] * self.size[1];

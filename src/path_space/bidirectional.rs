@@ -84,6 +84,11 @@ fn worth_in_place(old: usize, new: usize) -> f64 {
 }
 
 impl Lengths {
+    /// How many there are.
+    pub fn count(self) -> usize {
+        (self.most + 1).saturating_sub(self.least)
+    }
+
     /// The parts that may be left out of a path, with their worth.
     fn parts(self, edges: usize) -> impl Iterator<Item = (Range, f64)> + Clone {
         let fewest = usize::from(self.least == self.most);
