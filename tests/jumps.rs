@@ -11,8 +11,8 @@ use pathblend::scene::{Caster, Scene};
 use rayon::prelude::*;
 use std::path::Path;
 
-const SCENES: [&str; 11] =
-    ["box", "spheres", "plates", "door", "torus", "ring", "lamp", "gallery", "pool", "bokeh", "porch"];
+const SCENES: [&str; 12] =
+    ["box", "spheres", "plates", "door", "torus", "ring", "lamp", "gallery", "pool", "bokeh", "porch", "window"];
 
 fn scene(name: &str) -> Scene {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).join("scene.xml");

@@ -13,8 +13,8 @@ use pathblend::scene::Scene;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-const SCENES: [&str; 11] =
-    ["box", "spheres", "plates", "door", "torus", "ring", "lamp", "gallery", "pool", "bokeh", "porch"];
+const SCENES: [&str; 12] =
+    ["box", "spheres", "plates", "door", "torus", "ring", "lamp", "gallery", "pool", "bokeh", "porch", "window"];
 /// Side of the references, and of the tiles that they are compared in.
 const SIDE: usize = 64;
 const TILE: usize = 16;

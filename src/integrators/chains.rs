@@ -1,5 +1,6 @@
 //! What methods with chains share.
 
+use crate::math::{Discrete, Stream};
 use crate::scene::{Caster, Scene};
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
@@ -15,14 +16,14 @@ pub(super) fn share(mutations: u64, lane: usize, pass: u64) -> u64 {
     mutations / lanes + u64::from((lane as u64 + pass) % lanes < mutations % lanes)
 }
 
-/// Independent samples before the chains begin: four per pixel, within these bounds. Large steps refine what they find.
-const FIRST_SAMPLES: RangeInclusive<usize> = 100_000..=400_000;
+/// Independent samples before the chains begin: ten per pixel, within these bounds. Large steps refine what they find.
+const FIRST_SAMPLES: RangeInclusive<usize> = 20_000..=100_000;
 
 /// Independent samples in the batch with this number, for a film of `size`. Where the first finds no light, each pass draws
 /// another, which takes as long as mutations would.
 pub(super) fn batch_samples(size: [usize; 2], batch: u64) -> usize {
     let pixels = size[0] * size[1];
-    if batch == 0 { (4 * pixels).clamp(*FIRST_SAMPLES.start(), *FIRST_SAMPLES.end()) } else { pixels }
+    if batch == 0 { (10 * pixels).clamp(*FIRST_SAMPLES.start(), *FIRST_SAMPLES.end()) } else { pixels }
 }
 
 /// Independent samples of a target: what tells b_k.
@@ -95,6 +96,18 @@ pub(super) fn independent<M>(
         })
         .collect();
     chunks.concat()
+}
+
+/// Where the chains of each lane begin: at samples drawn in proportion to their `targets`, so that chains have their
+/// distribution from the first step on. The number of a sample and the chain's own random numbers, which differ by
+/// `family`; nothing where no sample has found light.
+pub(super) fn starts(targets: &[f64], seed: u64, family: u64) -> impl Iterator<Item = (usize, Stream)> {
+    let choice = Discrete::new(targets);
+    (0..LANES as u64).map_while(move |lane| {
+        let mut stream = Stream::new(seed, &[3, family, lane]);
+        let (chosen, _) = choice.as_ref()?.sample(stream.number());
+        Some((chosen, stream))
+    })
 }
 
 #[cfg(test)]

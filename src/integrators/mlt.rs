@@ -7,12 +7,12 @@
 //!
 //! Light seen directly is rendered by path tracing, and so is direct light unless the settings say otherwise.
 
-use super::chains::{LANES, Mean, Worth, batch_samples, independent, share};
+use super::chains::{LANES, Mean, Worth, batch_samples, independent, share, starts};
 use super::{Acceptance, ChainReport, Counts, path::Path, render::Settings};
 use crate::film::{Film, Health, Kernel, Splats};
 use crate::manifold::Rejection;
 use crate::markov::Tracer;
-use crate::math::{Discrete, Stream};
+use crate::math::Stream;
 use crate::path_space::{Kind, Lengths, PathMutations, PathSpace, Proposed, Target};
 use crate::paths::{Found, FullPath, Techniques, connect_visible};
 use crate::scene::{Caster, Scene};
@@ -105,11 +105,8 @@ impl Mlt {
         if self.lanes.iter().any(|lane| lane.chain.is_some()) {
             return samples as u64;
         }
-        let Some(choice) = Discrete::new(&targets) else { return samples as u64 };
         let caster = Caster::new(scene);
-        for (number, lane) in self.lanes.iter_mut().enumerate() {
-            let mut own = Stream::new(seed, &[3, 0, number as u64]);
-            let (chosen, _) = choice.sample(own.number());
+        for (lane, (chosen, own)) in self.lanes.iter_mut().zip(starts(&targets, seed, 0)) {
             lane.start(&caster, lengths, &mut stream(chosen), own);
         }
         samples as u64

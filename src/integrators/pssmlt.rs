@@ -11,23 +11,17 @@
 //! Light seen directly is rendered by path tracing, and so is direct light unless the settings say otherwise.
 
 use super::bdpt::ROULETTE_FROM;
-use super::chains::{LANES, Mean, Worth, batch_samples, independent, share};
+use super::chains::{LANES, Mean, Worth, batch_samples, independent, share, starts};
 use super::{Acceptance, ChainReport, Counts, path::Path, render::Settings};
 use crate::film::{Film, Health, Kernel, PathClass, Splats};
 use crate::markov::{ChainState, Mutations};
-use crate::math::{Discrete, Stream, Walk};
+use crate::math::{Stream, Walk};
+use crate::path_space::Lengths;
 use crate::paths::{FullPath, Open, TECHNIQUES, connect, trace_camera, trace_light};
 use crate::scene::{Caster, Scene};
 use crate::spectrum::Spectrum;
 use glam::DVec2;
 use rayon::prelude::*;
-
-/// Lengths of the paths that chains find.
-#[derive(Clone, Copy)]
-struct Lengths {
-    least: usize,
-    most: usize,
-}
 
 /// All that a state finds.
 #[derive(Clone, Default)]
@@ -76,11 +70,9 @@ pub(super) struct Pssmlt {
     lanes: Vec<Lane>,
 }
 
-impl Lengths {
-    /// First row of the light's walk; those of the camera's come before.
-    fn light_rows(self) -> usize {
-        self.most + 1
-    }
+/// First row of the light's walk; those of the camera's come before.
+fn light_rows(lengths: Lengths) -> usize {
+    lengths.most + 1
 }
 
 impl Pssmlt {
@@ -120,11 +112,8 @@ impl Pssmlt {
         });
         self.batches += 1;
         targets.iter().for_each(|target| self.mean.add(*target));
-        let Some(choice) = Discrete::new(&targets) else { return };
         let caster = Caster::new(scene);
-        for (number, lane) in self.lanes.iter_mut().enumerate() {
-            let mut own = Stream::new(seed, &[3, 0, number as u64]);
-            let (chosen, _) = choice.sample(own.number());
+        for (lane, (chosen, own)) in self.lanes.iter_mut().zip(starts(&targets, seed, 0)) {
             let mut state = state.clone();
             lane.find(&caster, lengths, &mut state, &mut stream(chosen));
             state.accept();
@@ -135,7 +124,7 @@ impl Pssmlt {
 
     pub(super) fn pass(&mut self, scene: &Scene, film: &mut Film, pass: u64, counts: &mut Counts) {
         self.direct.pass(scene, film, pass, counts);
-        if self.lengths.least > self.lengths.most {
+        if self.lengths.count() == 0 {
             return;
         }
         if self.mean.sum == 0.0 {
@@ -181,7 +170,7 @@ impl Lane {
         let film = scene.camera.film_position(first);
         let (camera, light) = (&mut walks.camera, &mut walks.light);
         trace_camera(scene, film, first, &mut state.rows(0, true, stream), lengths.most + 1, ROULETTE_FROM, camera);
-        let rows = &mut state.rows(lengths.light_rows(), true, stream);
+        let rows = &mut state.rows(light_rows(lengths), true, stream);
         trace_light(scene, rows, lengths.most, ROULETTE_FROM, light);
         let (camera, light) = (&camera.vertices, &light.vertices);
         let mut sum = Spectrum::BLACK;

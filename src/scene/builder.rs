@@ -294,6 +294,7 @@ impl Builder {
             solids: self.solids,
             solid_shapes: self.solid_shapes,
             shapes: self.shapes,
+            refracts: self.bsdfs.iter().any(refracts),
             bsdfs: self.bsdfs,
             reliefs: self.reliefs,
             lights: Discrete::new(&powers),
@@ -303,4 +304,9 @@ impl Builder {
             bvh,
         })
     }
+}
+
+/// Whether a boundary is smooth and bends light.
+fn refracts(bsdf: &Bsdf) -> bool {
+    bsdf.refractive_index().is_some() && [DVec3::Z, -DVec3::Z].iter().any(|wi| bsdf.is_delta(*wi))
 }

@@ -81,6 +81,8 @@ pub struct Scene {
     solid_shapes: Vec<u32>,
     shapes: Vec<Shape>,
     bsdfs: Vec<Bsdf>,
+    /// Whether there are smooth boundaries that bend light.
+    refracts: bool,
     /// By scattering model.
     reliefs: Vec<Option<Relief>>,
     emitters: Vec<Emitter>,
@@ -203,8 +205,7 @@ impl Scene {
 
     /// Whether there are smooth boundaries that bend light.
     pub fn refracts(&self) -> bool {
-        let smooth = |bsdf: &Bsdf| [DVec3::Z, -DVec3::Z].iter().any(|wi| bsdf.is_delta(*wi));
-        self.bsdfs.iter().any(|bsdf| bsdf.refractive_index().is_some() && smooth(bsdf))
+        self.refracts
     }
 
     /// All scattering models.

@@ -34,6 +34,7 @@ SPP = {
     "pool": 8192,
     "bokeh": 4096,
     "porch": 2048,
+    "window": 8192,
 }
 # The same for light tracing, where there are caustics.
 LIGHT_SPP = {"spheres": 2048, "torus": 2048, "ring": 2048, "lamp": 2048, "pool": 2048}

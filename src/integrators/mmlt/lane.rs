@@ -3,6 +3,7 @@
 use super::super::chains::Mean;
 use super::{Family, Share};
 use crate::film::{Health, Kernel, Splats};
+use crate::manifold::Rejection;
 use crate::markov::{
     ChainState, ControlledMemory, Jump, JumpMemory, Jumps, Mutations, Tracer, Tries, controlled_step, jump, retell,
 };
@@ -12,23 +13,18 @@ use crate::paths::{Found, FullPath};
 use crate::scene::{Caster, Scene};
 use std::collections::BTreeMap;
 
-/// Names of the tallies.
-pub(super) const KINDS: [&str; 9] = [
-    "large_step",
-    "small_step",
-    "technique_change",
-    Kind::ALL[0].name(),
-    Kind::ALL[1].name(),
-    Kind::ALL[2].name(),
-    Kind::ALL[3].name(),
-    Kind::ALL[4].name(),
-    Kind::ALL[5].name(),
-];
+/// The mutations in primary sample space; those in path space come after them.
+pub(super) const PRIMARY: [&str; 3] = ["large_step", "small_step", "technique_change"];
 const LARGE: usize = 0;
 const SMALL: usize = 1;
 const CHANGE: usize = 2;
-/// The first of the mutations in path space.
-pub(super) const PATH: usize = 3;
+/// How many kinds of mutations there are.
+pub(super) const KINDS: usize = PRIMARY.len() + Kind::ALL.len();
+
+/// Names of all kinds, in the order of their tallies.
+pub(super) fn names() -> impl Iterator<Item = &'static str> {
+    PRIMARY.into_iter().chain(Kind::ALL.map(Kind::name))
+}
 
 /// How far the target may be off, relative to itself, after the way to rows and back.
 const ROUND_TRIP: f64 = 1e-6;
@@ -44,7 +40,7 @@ pub(super) struct Chain {
     /// The path of `current`, as the technique that it came by has found it.
     path: FullPath,
     /// By kind, proposals and accepted ones. Technique changes of `mmlt` are among its small steps too.
-    pub tallies: [[u64; 2]; KINDS.len()],
+    pub tallies: [[u64; 2]; KINDS],
     /// Jumps for which no rows could be found.
     pub failed: u64,
     /// Mutations in path space that came to nothing, by cause.
@@ -64,10 +60,10 @@ impl Chain {
     }
 }
 
-/// What mutations bring, by their kind as in [`KINDS`].
+/// What mutations bring, by their kind.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Pilot {
-    pub gains: [Gain; KINDS.len()],
+    pub gains: [Gain; KINDS],
     /// Rays cast when the last mutation ended.
     rays: u64,
 }
@@ -255,8 +251,9 @@ impl Lane {
         let proposal = self.find(work.scene, work.tracer, &mut chain.state, &mut chain.stream);
         let luminance = proposal.map_or(0.0, |found| found.luminance);
         work.large_steps.add(luminance);
-        let ratio = luminance / chain.current.luminance;
-        self.decide(chain, LARGE, proposal, ratio, work);
+        let proposal = proposal.map(|found| (found, luminance / chain.current.luminance));
+        let number = chain.stream.number();
+        self.decide(chain, LARGE, proposal, number, work);
     }
 
     fn small_step(&mut self, chain: &mut Chain, work: &mut Work<'_>) {
@@ -276,8 +273,9 @@ impl Lane {
             let found = tracer.find(scene, technique, state, stream, proposal, health);
             (technique, found.map(|found| (found, 1.0)))
         };
-        let ratio = found.map_or(0.0, |(found, correction)| correction * found.luminance / current.luminance);
-        let accepted = self.decide(chain, SMALL, found.map(|(found, _)| found), ratio, work);
+        let ratio = |(found, correction): (Found, f64)| (found, correction * found.luminance / current.luminance);
+        let (proposal, number) = (found.map(ratio), stream.number());
+        let accepted = self.decide(chain, SMALL, proposal, number, work);
         if technique != before {
             chain.tally(CHANGE, accepted);
         }
@@ -286,45 +284,43 @@ impl Lane {
     /// A mutation in path space, of a path that keeps its technique (Otsu 2017, algorithm 1 of chapter 6).
     fn path_step(&mut self, chain: &mut Chain, work: &mut Work<'_>) {
         let Chain { state, stream, current, path, rejections, .. } = chain;
-        let Work { scene, tracer, .. } = *work;
-        let Self { path_space, proposal, returned, health, .. } = self;
-        let Proposed { kind, outcome } = path_space.propose(scene, (path, current), stream, proposal);
+        let Proposed { kind, outcome } =
+            self.path_space.propose(work.scene, (path, current), stream, &mut self.proposal);
         let Some(kind) = kind else {
             chain.weight += 1.0;
             return;
         };
         state.propose(false);
-        let mut reject = |cause: &'static str| *rejections.entry(cause).or_default() += 1;
-        let mut judged = match outcome {
-            Ok(_) if retell(scene, proposal, current.technique, state, stream).is_none() => {
-                reject("inversion");
-                None
-            }
-            Ok(judged) => Some(judged),
-            Err(cause) => {
-                reject(cause.name());
-                None
-            }
-        };
-        // What is about to be accepted must also be what its rows lead to (section 6.7.1).
-        if let Some((found, ratio)) = judged
-            && stream.clone().number() < ratio.min(1.0)
-        {
-            let back = tracer.find(scene, found.technique, state, stream, returned, health);
-            let same = |back: &Found| (back.luminance / found.luminance - 1.0).abs() < ROUND_TRIP;
-            match back.filter(same) {
-                Some(back) => {
-                    judged = Some((back, ratio));
-                    std::mem::swap(proposal, returned);
-                }
-                None => {
-                    reject("round_trip");
-                    judged = None;
-                }
-            }
+        let (number, technique) = (stream.number(), current.technique);
+        // Rows are wanted of what is about to be accepted alone.
+        let confirmed = outcome.map_err(Rejection::name).and_then(|(found, ratio)| match number < ratio {
+            true => Ok((self.confirm(work, found, technique, state, stream)?, ratio)),
+            false => Ok((found, ratio)),
+        });
+        if let Err(cause) = confirmed {
+            *rejections.entry(cause).or_default() += 1;
         }
-        let ratio = judged.map_or(0.0, |(_, ratio)| ratio);
-        self.decide(chain, PATH + kind as usize, judged.map(|(found, _)| found), ratio, work);
+        self.decide(chain, PRIMARY.len() + kind as usize, confirmed.ok(), number, work);
+    }
+
+    /// Has the state, whose technique is `from`, lead to the proposal `found`; that must also be what its rows lead to (Otsu
+    /// 2017, section 6.7.1). Fails with the cause.
+    fn confirm(
+        &mut self,
+        work: &Work<'_>,
+        found: Found,
+        from: usize,
+        state: &mut ChainState,
+        stream: &mut Stream,
+    ) -> Result<Found, &'static str> {
+        let Work { scene, tracer, .. } = *work;
+        let Self { proposal, returned, health, .. } = self;
+        retell(scene, proposal, from, state, stream).ok_or("inversion")?;
+        let back = tracer.find(scene, found.technique, state, stream, returned, health);
+        let same = |back: &Found| (back.luminance / found.luminance - 1.0).abs() < ROUND_TRIP;
+        let back = back.filter(same).ok_or("round_trip")?;
+        std::mem::swap(proposal, returned);
+        Ok(back)
     }
 
     /// A large step among all techniques.
@@ -341,29 +337,30 @@ impl Lane {
             let number = (found.technique as f64 + stream.number()) / tracer.techniques() as f64;
             state.set(Tracer::TECHNIQUE_ROW, [number, 0.0, 0.0, 0.0]);
         }
-        self.decide(chain, LARGE, proposal, sum / before, work);
+        let number = chain.stream.number();
+        self.decide(chain, LARGE, proposal.map(|found| (found, sum / before)), number, work);
     }
 
-    /// Accepts or rejects the proposal, whose acceptance is `ratio`; says which.
+    /// Accepts the proposal, which comes with its acceptance, if `number` is less than that; says whether.
     #[inline]
     fn decide(
         &mut self,
         chain: &mut Chain,
         kind: usize,
-        proposal: Option<Found>,
-        ratio: f64,
+        proposal: Option<(Found, f64)>,
+        number: f64,
         work: &mut Work<'_>,
     ) -> bool {
-        let acceptance = if proposal.is_some() { ratio.min(1.0) } else { 0.0 };
+        let acceptance = proposal.map_or(0.0, |(_, ratio)| ratio.min(1.0));
         chain.weight += 1.0 - acceptance;
         if let Some(pilot) = &mut self.pilot {
             let rays = work.scene.rays();
             let way = if acceptance > 0.0 { way(work.scene, &chain.path, &self.proposal) } else { 0.0 };
             pilot.gains[kind].add(acceptance * way, rays - std::mem::replace(&mut pilot.rays, rays));
         }
-        let accepted = chain.stream.number() < acceptance;
+        let accepted = number < acceptance;
         chain.tally(kind, accepted);
-        let Some(found) = proposal else {
+        let Some((found, _)) = proposal else {
             chain.state.reject();
             return false;
         };

@@ -12,12 +12,12 @@
 
 mod lane;
 
-use super::chains::{LANES, Mean, Worth, batch_samples, independent, share};
+use super::chains::{LANES, Mean, Worth, batch_samples, independent, share, starts};
 use super::{Acceptance, ChainReport, Counts, path::Path, render::Settings};
 use crate::film::{Film, Kernel, Splats};
 use crate::markov::{ChainState, Mutations, Scales, Tracer};
-use crate::math::{Discrete, Stream, Walk};
-use crate::path_space::{Gain, Kind, Weights};
+use crate::math::{Stream, Walk};
+use crate::path_space::{Gain, Weights};
 use crate::paths::Open;
 use crate::scene::{Caster, Scene};
 use lane::{Chain, Job, Lane};
@@ -94,8 +94,8 @@ impl Mmlt {
     }
 
     /// Draws a batch of independent samples of a length in which no light has been found; starts its chains where one
-    /// finds some.
-    fn explore(&mut self, scene: &Scene, index: usize) {
+    /// finds some, and finds out how its paths had better move.
+    fn explore(&mut self, scene: &Scene, kernel: &Kernel, index: usize) {
         let count = self.lengths.len();
         let length = &mut self.lengths[index];
         let (tracer, batches, edges) = (length.tracer, length.batches, length.tracer.edges as u64);
@@ -110,15 +110,15 @@ impl Mmlt {
         });
         length.batches += 1;
         targets.iter().for_each(|target| length.mean.add(*target));
-        let Some(choice) = Discrete::new(&targets) else { return };
         let caster = Caster::new(scene);
-        for (number, lane) in self.lanes.iter_mut().enumerate() {
-            let mut stream = Stream::new(self.seed, &[3, edges, number as u64]);
-            let (chosen, _) = choice.sample(stream.number());
+        for (lane, (chosen, stream)) in self.lanes.iter_mut().zip(starts(&targets, self.seed, edges)) {
             let (mut state, mut draws) = (state.clone(), Stream::new(self.seed, &key(chosen)));
             let current = lane.find(&caster, tracer, &mut state, &mut draws);
             state.accept();
             lane.chains[index] = current.map(|current| Chain::new(state, stream, current, lane.take_proposal()));
+        }
+        if self.family == Family::Fused && self.mutations.path_step > 0.0 {
+            self.adapt(scene, kernel, index);
         }
     }
 
@@ -133,11 +133,11 @@ impl Mmlt {
             lane.pilot(scene, kernel, size, (index, tracer), (mutations, stream)).gains
         };
         let runs: Vec<_> = self.lanes.par_iter_mut().enumerate().map(run).collect();
-        let mut gains = [Gain::default(); lane::KINDS.len()];
+        let mut gains = [Gain::default(); lane::KINDS];
         for run in &runs {
             gains.iter_mut().zip(run).for_each(|(gain, other)| gain.merge(other));
         }
-        let path = std::array::from_fn(|kind| gains[lane::PATH + kind]);
+        let path = std::array::from_fn(|kind| gains[lane::PRIMARY.len() + kind]);
         length.weights = Weights::of(kinds, &path);
     }
 
@@ -157,10 +157,7 @@ impl Mmlt {
         self.direct.pass(scene, film, pass, counts);
         for index in 0..self.lengths.len() {
             if self.lengths[index].mean.sum == 0.0 {
-                self.explore(scene, index);
-                if self.family == Family::Fused {
-                    self.adapt(scene, &film.kernel, index);
-                }
+                self.explore(scene, &film.kernel, index);
             }
         }
         let (kernel, size) = (film.kernel.clone(), film.size);
@@ -186,14 +183,14 @@ impl Mmlt {
     /// What the chains have done so far, summed over the lanes.
     fn report(&self, counts: &mut Counts) {
         let chains = |index: usize| self.lanes.iter().filter_map(move |lane| lane.chains[index].as_ref());
-        for (kind, name) in lane::KINDS.into_iter().enumerate() {
+        for (kind, name) in lane::names().enumerate() {
             let sum = |(index, length): (usize, &Length)| {
                 let tallies = chains(index).map(|chain| chain.tallies[kind]);
                 let [proposed, accepted] = tallies.fold([0; 2], |[a, b], tally| [a + tally[0], b + tally[1]]);
                 Acceptance { length: length.tracer.edges, proposed, accepted }
             };
             let lengths: Vec<Acceptance> = self.lengths.iter().enumerate().map(sum).collect();
-            if lengths.iter().any(|length| length.proposed > 0) || !Kind::ALL.iter().any(|kind| kind.name() == name) {
+            if kind < lane::PRIMARY.len() || lengths.iter().any(|length| length.proposed > 0) {
                 counts.acceptance.insert(name, lengths);
             }
         }
