@@ -68,7 +68,7 @@ fn another_reference_is_made_anew() {
 fn bad_recipes_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let twice = format!("[[scenes]]\nfile = {:?}\n[[scenes]]\n", scene("box"));
-    let cases: [(&str, &str, &[&str]); 9] = [
+    let cases: [(&str, &str, &[&str]); 10] = [
         ("[[scenes]]\n", &twice, &["two scenes", "`box`"]),
         ("seeds = 2", "seeds = 1", &["seeds", "at least 2"]),
         ("[0.02, 0.05]", "[]", &["times"]),
@@ -78,6 +78,7 @@ fn bad_recipes_are_refused() {
         ("jumps = \"always\"", "jump = 1.5", &["`tries`", "technique jump is 1.5", "0 to 1"]),
         ("jumps = \"always\"", "hops = 3", &["hops", "line 11"]),
         ("size = [12, 8]", "size = [12]", &["line 1"]),
+        ("seeds = 2", "seeds = 2\nclasses = \"SXS\"", &["`classes`", "L, D, S and E"]),
     ];
     for (from, to, parts) in cases {
         fs::write(folder.path().join("bad.toml"), recipe(|text| text.replace(from, to))).unwrap();

@@ -2,10 +2,11 @@
 
 use super::{ExperimentRecipe, ReportError, Variant};
 use crate::image::metrics::compare;
-use crate::image::{Image, WriteOptions};
+use crate::image::{Image, Layer, WriteOptions};
 use crate::integrators::{Acceptance, Budget, ChainReport, Settings, render};
 use crate::load;
 use crate::scene::Scene;
+use ndarray::{Array3, Axis};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -113,15 +114,17 @@ impl ExperimentRecipe {
                     .image
                     .write(&target, &WriteOptions::default())?;
             }
-            let image = Image::read(&target)?;
+            let image = of_classes(Image::read(&target)?, self.classes.as_deref());
             // Seeds outermost, so that what the machine does meanwhile falls on all variants.
             for seed in 0..self.seeds {
                 for time in &self.times {
                     for variant in &self.variants {
-                        let key = key(&scene, variant, seed, *time, &how);
+                        let classes = self.classes.as_deref();
+                        let key = key(&scene, variant, seed, *time, &format!("{how} {}", classes.unwrap_or_default()));
                         if !kept.runs.contains_key(&key) {
                             log(&format!("{name}: {} for {time} s, seed {seed}", variant.name));
-                            kept.add(&one(&scene, &name, variant, seed, *time, key.clone(), &image)?)?;
+                            let run = Plan { scene: &scene, variant, classes, seed, time: *time };
+                            kept.add(&run.one(&name, key.clone(), &image)?)?;
                         }
                         runs.extend(kept.runs.get(&key).cloned());
                     }
@@ -149,38 +152,80 @@ fn key(scene: &Scene, variant: &Variant, seed: u64, time: f64, reference: &str) 
     fingerprint(&format!("{build} {} {depth} {method} {mutations} {seed} {time} {reference}", scene.hash))
 }
 
-fn one(
-    scene: &Scene,
-    name: &str,
-    variant: &Variant,
+/// A run that is to be made.
+struct Plan<'a> {
+    scene: &'a Scene,
+    variant: &'a Variant,
+    classes: Option<&'a str>,
     seed: u64,
     time: f64,
-    key: String,
-    reference: &Image,
-) -> Result<Run, ReportError> {
-    let settings = Settings {
-        seed,
-        max_depth: scene.max_depth,
-        features: false,
-        budget: Budget::Cpu(Duration::from_secs_f64(time)),
-        mutations: variant.mutations,
-        ..Settings::default()
-    };
-    let outcome = render(scene, variant.integrator, &settings, |_| {});
-    let metrics = compare(&outcome.image, reference)?;
-    let counts = outcome.counts;
-    Ok(Run {
-        key,
-        scene: name.to_owned(),
-        variant: variant.name.clone(),
-        seed,
-        time,
-        cpu_s: outcome.cpu.as_secs_f64(),
-        samples: counts.samples,
-        rays: counts.rays,
-        mse: metrics.mse,
-        relmse: metrics.relmse,
-        acceptance: counts.acceptance.into_iter().map(|(kind, lengths)| (kind.to_owned(), lengths)).collect(),
-        chains: counts.chains,
-    })
+}
+
+impl Plan<'_> {
+    fn one(&self, name: &str, key: String, reference: &Image) -> Result<Run, ReportError> {
+        let Self { scene, variant, classes, seed, time } = *self;
+        let settings = Settings {
+            seed,
+            max_depth: scene.max_depth,
+            features: classes.is_some(),
+            budget: Budget::Cpu(Duration::from_secs_f64(time)),
+            mutations: variant.mutations,
+            ..Settings::default()
+        };
+        let outcome = render(scene, variant.integrator, &settings, |_| {});
+        let metrics = compare(&of_classes(outcome.image, classes), reference)?;
+        let counts = outcome.counts;
+        Ok(Run {
+            key,
+            scene: name.to_owned(),
+            variant: variant.name.clone(),
+            seed,
+            time,
+            cpu_s: outcome.cpu.as_secs_f64(),
+            samples: counts.samples,
+            rays: counts.rays,
+            mse: metrics.mse,
+            relmse: metrics.relmse,
+            acceptance: counts.acceptance.into_iter().map(|(kind, lengths)| (kind.to_owned(), lengths)).collect(),
+            chains: counts.chains,
+        })
+    }
+}
+
+/// The luminance of the path classes with `classes` in them, as a grey image; all of the image if nothing is said.
+fn of_classes(image: Image, classes: Option<&str>) -> Image {
+    let Some(classes) = classes else { return image };
+    let mut colour = Array3::zeros(image.colour.dim());
+    for (name, layer) in &image.layers {
+        if let (Some(class), Layer::Luminance(light)) = (name.strip_prefix("path_"), layer)
+            && once_each(class).contains(classes)
+        {
+            colour += &light.view().insert_axis(Axis(2));
+        }
+    }
+    Image { colour, ..image }
+}
+
+/// A name whose letters do not repeat.
+fn once_each(name: &str) -> String {
+    let mut letters: Vec<char> = name.chars().collect();
+    letters.dedup();
+    letters.into_iter().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array2;
+
+    #[test]
+    fn only_the_light_of_the_classes_is_judged() {
+        let layer = |light: f32| Layer::Luminance(Array2::from_elem((2, 3), light));
+        let mut image = Image::new(3, 2);
+        for (name, light) in [("path_LSDSE", 1.0), ("path_LSSDDSE", 2.0), ("path_LDSE", 4.0), ("albedo", 8.0)] {
+            image.layers.insert(name.to_owned(), layer(light));
+        }
+        assert_eq!(of_classes(image.clone(), Some("SDS")).colour, Array3::from_elem((2, 3, 3), 3.0));
+        assert_eq!(of_classes(image.clone(), None).colour, image.colour);
+    }
 }

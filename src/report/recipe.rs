@@ -15,6 +15,9 @@ pub struct ExperimentRecipe {
     pub size: [usize; 2],
     /// Longest path in edges; else what the scene files say.
     pub max_depth: Option<usize>,
+    /// Which light is judged, if not all: that of the path classes with this in them, where D and S that repeat count once,
+    /// such as `SDS`.
+    pub classes: Option<String>,
     /// Independent runs of each variant.
     pub seeds: u64,
     /// Times of a run; each is a run of its own.
@@ -55,6 +58,13 @@ impl ExperimentRecipe {
         }
         if recipe.seeds < 2 {
             return Err(fail("`seeds`: expected at least 2, or nothing could be said of the spread".into()));
+        }
+        if recipe
+            .classes
+            .as_ref()
+            .is_some_and(|classes| classes.is_empty() || !classes.chars().all(|c| "LDSE".contains(c)))
+        {
+            return Err(fail("`classes`: expected letters of L, D, S and E, such as `SDS`".into()));
         }
         if recipe.scenes.is_empty() || recipe.variants.is_empty() {
             return Err(fail("expected at least one scene in `scenes` and one variant in `variants`".into()));
