@@ -1,7 +1,7 @@
 //! `pathblend compare`.
 
 use super::say;
-use crate::image::{Image, metrics};
+use crate::image::{Image, ImageError, is_in_classes, metrics, write_false_colour};
 use anyhow::Context;
 use clap::Args;
 use std::path::PathBuf;
@@ -12,6 +12,12 @@ pub(super) struct Compare {
     image: PathBuf,
     /// What it should look like.
     reference: PathBuf,
+    /// Compare the light of those path classes alone that have this in their name, where letters that repeat count once
+    #[arg(long, value_name = "SDS", value_parser = path_classes)]
+    classes: Option<String>,
+    /// Picture of the difference over the sum: blue where the image is too dark, orange where too bright
+    #[arg(long, value_name = "MAP.png")]
+    map: Option<PathBuf>,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -19,10 +25,19 @@ pub(super) struct Compare {
 
 impl Compare {
     pub(super) fn run(self) -> anyhow::Result<()> {
-        let image = Image::read(&self.image)?;
-        let reference = Image::read(&self.reference)?;
+        let [image, reference] = [&self.image, &self.reference].map(|file| {
+            let image = Image::read(file)?;
+            Ok::<_, ImageError>(match &self.classes {
+                Some(classes) => image.of_classes(classes),
+                None => image,
+            })
+        });
+        let (image, reference) = (image?, reference?);
         let found = metrics::compare(&image, &reference)
             .with_context(|| format!("cannot compare {} with {}", self.image.display(), self.reference.display()))?;
+        if let Some(map) = &self.map {
+            write_false_colour(map, metrics::difference(&image, &reference)?.view())?;
+        }
         if self.json {
             say(format_args!("{}", serde_json::to_string(&found)?))?;
             return Ok(());
@@ -45,5 +60,12 @@ impl Compare {
             found.pixels, found.nonfinite
         ))?;
         Ok(())
+    }
+}
+
+fn path_classes(text: &str) -> Result<String, String> {
+    match is_in_classes(text) {
+        true => Ok(text.to_owned()),
+        false => Err("expected letters of L, D, S and E, such as SDS".to_owned()),
     }
 }

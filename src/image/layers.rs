@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use ndarray::{Array2, Array3};
+use ndarray::{Array2, Array3, Axis};
 use serde_json::{Map, Value};
 
 use super::{ImageError, WriteOptions, exr};
@@ -102,6 +102,20 @@ impl Image {
         exr::write(self, path, options)
     }
 
+    /// The luminance of the path classes that have `classes` in their name, where letters that repeat count once, as a grey
+    /// picture: `SDS` is in `LSDSE` and in `LSSDDSE`.
+    pub fn of_classes(self, classes: &str) -> Self {
+        let mut colour = Array3::zeros(self.colour.dim());
+        for (name, layer) in &self.layers {
+            if let (Some(class), Layer::Luminance(light)) = (name.strip_prefix("path_"), layer)
+                && once_each(class).contains(classes)
+            {
+                colour += &light.view().insert_axis(Axis(2));
+            }
+        }
+        Self { colour, ..self }
+    }
+
     /// Checks what the types cannot: three channels, and layers with proper names and this image's size.
     pub(super) fn check(&self) -> Result<(), ImageError> {
         let (height, width, _) = self.colour.dim();
@@ -138,6 +152,18 @@ pub(super) fn is_name_char(c: char) -> bool {
     c.is_ascii_alphanumeric() || c == '_'
 }
 
+/// Whether the name of a path class can have this in it.
+pub fn is_in_classes(text: &str) -> bool {
+    !text.is_empty() && text.chars().all(|letter| "LDSE".contains(letter))
+}
+
+/// A name in which no letter follows itself.
+fn once_each(name: &str) -> String {
+    let mut letters: Vec<char> = name.chars().collect();
+    letters.dedup();
+    letters.into_iter().collect()
+}
+
 fn check_shape(layer: &str, found: &[usize], expected: &[usize]) -> Result<(), ImageError> {
     if found == expected {
         return Ok(());
@@ -164,6 +190,19 @@ mod tests {
         for bad in ["", "_a", "9a", "a.b", "a b", "ä", "C<L.>", "a\0"] {
             assert!(check_layer_name(bad).is_err(), "{bad:?} passed");
         }
+    }
+
+    #[test]
+    fn classes_are_found_by_what_is_in_them() {
+        let mut image = Image::new(3, 2);
+        for (name, light) in [("path_LSDSE", 1.0), ("path_LSSDDSE", 2.0), ("path_LDSE", 4.0), ("albedo", 8.0)] {
+            image.insert(name, Layer::Luminance(Array2::from_elem((2, 3), light))).unwrap();
+        }
+        let colour = |classes| image.clone().of_classes(classes).colour;
+        assert_eq!(colour("SDS"), Array3::from_elem((2, 3, 3), 3.0));
+        assert_eq!(colour("DSE"), Array3::from_elem((2, 3, 3), 7.0));
+        assert_eq!(colour("SE"), colour("DSE"));
+        assert_eq!(colour("LE"), Image::new(3, 2).colour);
     }
 
     #[test]

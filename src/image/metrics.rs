@@ -16,7 +16,7 @@
 use ndarray::{Array2, ArrayView1, ArrayView3, Axis, Zip};
 use serde::Serialize;
 
-use super::{Image, ImageError, srgb};
+use super::{Image, ImageError, luminance, srgb};
 
 /// Keeps the relative measures finite where the reference is black.
 pub const EPSILON: f64 = 0.01;
@@ -66,6 +66,20 @@ pub struct Trimmed {
     pub mape: f64,
     /// See [`Metrics::flip`].
     pub flip: f64,
+}
+
+/// Height × width: where the luminance of `image` is below that of `reference` and where above, by their difference over
+/// their sum: 0 for all too dark, 0.5 for the same, 1 for all too bright, NaN where either is not finite.
+///
+/// # Errors
+/// As [`compare`].
+pub fn difference(image: &Image, reference: &Image) -> Result<Array2<f32>, ImageError> {
+    check_pair(image, reference)?;
+    let light = |image: &Image, y: usize, x: usize| luminance([0, 1, 2].map(|channel| image.colour[[y, x, channel]]));
+    Ok(Array2::from_shape_fn((image.height(), image.width()), |(y, x)| {
+        let (a, b) = (light(image, y, x), light(reference, y, x));
+        0.5 + 0.5 * (a - b) / (a.abs() + b.abs() + EPSILON as f32)
+    }))
 }
 
 /// Measures how far `image` is from `reference`, on their colour alone.

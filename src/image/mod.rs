@@ -16,7 +16,9 @@ mod whole;
 pub use colour_map::diverging;
 pub use error::ImageError;
 pub use exr::{Precision, WriteOptions, layers_path};
-pub use layers::{DEPTH_KEY, INTEGRATOR_KEY, Image, LUMINANCE_WEIGHTS, Layer, SCENE_KEY, check_layer_name, luminance};
+pub use layers::{
+    DEPTH_KEY, INTEGRATOR_KEY, Image, LUMINANCE_WEIGHTS, Layer, SCENE_KEY, check_layer_name, is_in_classes, luminance,
+};
 pub use png::{write_false_colour, write_png};
 pub use srgb::{encode as srgb_encode, to_srgb8};
 pub use whole::write_whole;

@@ -2,11 +2,10 @@
 
 use super::{ExperimentRecipe, ReportError, Variant};
 use crate::image::metrics::compare;
-use crate::image::{Image, Layer, WriteOptions};
+use crate::image::{Image, WriteOptions};
 use crate::integrators::{Acceptance, Budget, ChainReport, Settings, render};
 use crate::load;
 use crate::scene::Scene;
-use ndarray::{Array3, Axis};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -114,7 +113,7 @@ impl ExperimentRecipe {
                     .image
                     .write(&target, &WriteOptions::default())?;
             }
-            let image = of_classes(Image::read(&target)?, self.classes.as_deref());
+            let image = judged(Image::read(&target)?, self.classes.as_deref());
             // Seeds outermost, so that what the machine does meanwhile falls on all variants.
             for seed in 0..self.seeds {
                 for time in &self.times {
@@ -173,7 +172,7 @@ impl Plan<'_> {
             ..Settings::default()
         };
         let outcome = render(scene, variant.integrator, &settings, |_| {});
-        let metrics = compare(&of_classes(outcome.image, classes), reference)?;
+        let metrics = compare(&judged(outcome.image, classes), reference)?;
         let counts = outcome.counts;
         Ok(Run {
             key,
@@ -192,40 +191,10 @@ impl Plan<'_> {
     }
 }
 
-/// The luminance of the path classes with `classes` in them, as a grey image; all of the image if nothing is said.
-fn of_classes(image: Image, classes: Option<&str>) -> Image {
-    let Some(classes) = classes else { return image };
-    let mut colour = Array3::zeros(image.colour.dim());
-    for (name, layer) in &image.layers {
-        if let (Some(class), Layer::Luminance(light)) = (name.strip_prefix("path_"), layer)
-            && once_each(class).contains(classes)
-        {
-            colour += &light.view().insert_axis(Axis(2));
-        }
-    }
-    Image { colour, ..image }
-}
-
-/// A name whose letters do not repeat.
-fn once_each(name: &str) -> String {
-    let mut letters: Vec<char> = name.chars().collect();
-    letters.dedup();
-    letters.into_iter().collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use ndarray::Array2;
-
-    #[test]
-    fn only_the_light_of_the_classes_is_judged() {
-        let layer = |light: f32| Layer::Luminance(Array2::from_elem((2, 3), light));
-        let mut image = Image::new(3, 2);
-        for (name, light) in [("path_LSDSE", 1.0), ("path_LSSDDSE", 2.0), ("path_LDSE", 4.0), ("albedo", 8.0)] {
-            image.layers.insert(name.to_owned(), layer(light));
-        }
-        assert_eq!(of_classes(image.clone(), Some("SDS")).colour, Array3::from_elem((2, 3, 3), 3.0));
-        assert_eq!(of_classes(image.clone(), None).colour, image.colour);
+/// What of an image is judged.
+fn judged(image: Image, classes: Option<&str>) -> Image {
+    match classes {
+        Some(classes) => image.of_classes(classes),
+        None => image,
     }
 }

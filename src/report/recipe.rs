@@ -2,6 +2,7 @@
 
 use super::ReportError;
 use crate::blend::{RecipeScene, Reference, repeated};
+use crate::image::is_in_classes;
 use crate::integrators::Method;
 use crate::markov::Mutations;
 use serde::{Deserialize, Serialize};
@@ -59,11 +60,7 @@ impl ExperimentRecipe {
         if recipe.seeds < 2 {
             return Err(fail("`seeds`: expected at least 2, or nothing could be said of the spread".into()));
         }
-        if recipe
-            .classes
-            .as_ref()
-            .is_some_and(|classes| classes.is_empty() || !classes.chars().all(|c| "LDSE".contains(c)))
-        {
+        if recipe.classes.as_ref().is_some_and(|classes| !is_in_classes(classes)) {
             return Err(fail("`classes`: expected letters of L, D, S and E, such as `SDS`".into()));
         }
         if recipe.scenes.is_empty() || recipe.variants.is_empty() {
