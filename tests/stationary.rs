@@ -5,10 +5,9 @@
 
 mod common;
 
-use common::{Estimate, SIGMAS, build, diffuse, estimate, glass, images, images_with, pinhole, room};
+use common::{Estimate, SIGMAS, build, diffuse, estimate, images, images_with, pinhole, rooms};
 use glam::DVec3;
-use pathblend::bsdf::{Blend, Bsdf, Conductor, Distribution, RoughConductor, RoughDielectric, Roughness};
-use pathblend::camera::{Camera, Projection};
+use pathblend::bsdf::Bsdf;
 use pathblend::geometry::Solid;
 use pathblend::image::{Image, Layer};
 use pathblend::integrators::{Budget, Method, Settings, render};
@@ -18,23 +17,6 @@ use pathblend::scene::{Builder, Scene};
 use pathblend::spectrum::Spectrum;
 
 const SIZE: usize = 8;
-
-/// A room with a light under its ceiling, a ball of glass, and one of which a part is rough metal everywhere.
-fn scene() -> Scene {
-    let mut builder = Builder::new();
-    let wall = builder.bsdf(diffuse(0.6));
-    builder.mesh(room(), wall, None).unwrap();
-    let clear = builder.bsdf(glass(1.5));
-    builder.solid(Solid::sphere(DVec3::new(-0.4, -0.5, 0.1), 0.35), clear, None).unwrap();
-    let metal = Conductor { index: None, specular_reflectance: Spectrum::grey(0.9).into() };
-    let rough = RoughConductor { metal, roughness: Roughness::isotropic(Distribution::Ggx, 0.15) };
-    let nested = Box::new([diffuse(0.7), Bsdf::RoughConductor(rough)]);
-    let mixed = builder.bsdf(Bsdf::Blend(Blend { weight: 0.6.into(), nested }));
-    builder.solid(Solid::sphere(DVec3::new(0.45, -0.6, -0.2), 0.35), mixed, None).unwrap();
-    let lamp = Solid::disk(DVec3::new(0.2, 0.95, 0.0), -DVec3::Y, 0.4);
-    builder.solid(lamp, wall, Some(Spectrum::grey(5.0).into())).unwrap();
-    build(builder, pinhole(SIZE, 0.7, DVec3::new(0.0, 0.0, 0.95), -DVec3::Z), 5)
-}
 
 /// A ball close before the camera, within a hollow one: where a walk arrives elsewhere on them, the same direction has
 /// quite other numbers.
@@ -46,41 +28,6 @@ fn balls() -> Scene {
     let lamp = Solid::disk(DVec3::new(0.2, 0.95, 0.4), -DVec3::Y, 0.4);
     builder.solid(lamp, wall, Some(Spectrum::grey(5.0).into())).unwrap();
     build(builder, pinhole(SIZE, 0.6, DVec3::new(0.0, 0.2, 0.95), DVec3::new(0.0, -0.2, -1.0).normalize()), 4)
-}
-
-/// Water over the floor of a room, with a light above it, through a lens: chains on either side of what the camera sees.
-fn water() -> Scene {
-    let mut builder = Builder::new();
-    let wall = builder.bsdf(diffuse(0.7));
-    builder.mesh(room(), wall, None).unwrap();
-    let surface = builder.bsdf(glass(1.33));
-    builder.solid(Solid::disk(DVec3::new(0.0, -0.3, 0.0), DVec3::Y, 1.5), surface, None).unwrap();
-    let lamp = Solid::disk(DVec3::new(0.2, 0.9, -0.1), -DVec3::Y, 0.3);
-    builder.solid(lamp, wall, Some(Spectrum::grey(9.0).into())).unwrap();
-    let projection = Projection::Perspective { lens_radius: 0.05, focus_distance: 1.3 };
-    let camera = pinhole(SIZE, 0.6, DVec3::new(0.0, 0.5, 0.9), DVec3::new(0.0, -1.0, -0.9).normalize());
-    build(builder, Camera { projection, ..camera }, 5)
-}
-
-/// A polished floor and a ball of frosted glass, under a light.
-fn polished() -> Scene {
-    let mut builder = Builder::new();
-    let wall = builder.bsdf(diffuse(0.6));
-    builder.mesh(room(), wall, None).unwrap();
-    let metal = Conductor { index: None, specular_reflectance: Spectrum::grey(0.8).into() };
-    let polish = RoughConductor { metal, roughness: Roughness::isotropic(Distribution::Ggx, 0.05) };
-    let floor = builder.bsdf(Bsdf::RoughConductor(polish));
-    builder.solid(Solid::disk(DVec3::new(0.0, -0.8, 0.0), DVec3::Y, 1.5), floor, None).unwrap();
-    let one = Spectrum::ONE;
-    let roughness = Roughness::isotropic(Distribution::Ggx, 0.06);
-    let frosted = RoughDielectric { eta: 1.5, roughness, specular_reflectance: one, specular_transmittance: one };
-    let frosted = builder.bsdf(Bsdf::RoughDielectric(frosted));
-    builder.solid(Solid::sphere(DVec3::new(0.1, -0.3, 0.0), 0.4), frosted, None).unwrap();
-    let clear = builder.bsdf(glass(1.4));
-    builder.solid(Solid::disk(DVec3::new(0.0, 0.6, 0.0), DVec3::Y, 1.5), clear, None).unwrap();
-    let lamp = Solid::disk(DVec3::new(0.2, 0.9, -0.1), -DVec3::Y, 0.3);
-    builder.solid(lamp, wall, Some(Spectrum::grey(9.0).into())).unwrap();
-    build(builder, pinhole(SIZE, 0.7, DVec3::new(0.0, 0.1, 0.95), DVec3::new(0.0, -0.3, -1.0).normalize()), 5)
 }
 
 /// The light of one class in each quarter of the image.
@@ -201,23 +148,23 @@ fn in_path_space() -> Vec<(&'static str, Method, Mutations)> {
 
 #[test]
 fn path_space_keeps_the_distribution() {
-    keep(&scene(), in_path_space(), 150);
+    keep(&rooms::balls(SIZE), in_path_space(), 50);
 }
 
 #[test]
 fn path_space_keeps_the_distribution_under_water() {
-    keep(&water(), in_path_space(), 150);
+    keep(&rooms::water(SIZE), in_path_space(), 50);
 }
 
 /// Vertices that are nearly mirrors, or nearly clear, move with their chains.
 #[test]
 fn path_space_keeps_the_distribution_among_glossy_surfaces() {
-    keep(&polished(), in_path_space(), 150);
+    keep(&rooms::polished(SIZE), in_path_space(), 50);
 }
 
 #[test]
 fn mutations_keep_the_distribution() {
-    keep(&scene(), cases(), 150);
+    keep(&rooms::balls(SIZE), cases(), 150);
 }
 
 #[test]
@@ -260,7 +207,7 @@ fn keep(scene: &Scene, cases: Vec<(&'static str, Method, Mutations)>, passes: u6
 /// What chains are scaled by, b of each length, is the light of paths of that length, and as uncertain as is said.
 #[test]
 fn normalisations_are_the_light_of_their_length() {
-    let scene = scene();
+    let scene = rooms::balls(SIZE);
     let truth = images(&scene, Method::Bdpt, 150);
     let light_of = |edges: usize| {
         let layer = |image: &Image| {

@@ -3,6 +3,8 @@
 // Each file of tests is a crate of its own, and none uses all of this.
 #![allow(dead_code)]
 
+pub mod rooms;
+
 use glam::{DVec2, DVec3, Vec3};
 use pathblend::bsdf::{Bsdf, Dielectric, Diffuse};
 use pathblend::camera::{Camera, Projection};

@@ -1,0 +1,195 @@
+//! Mutations in path space are in detailed balance: as much goes from here to there as comes back. Independent paths, each
+//! worth what a chain's target has of it, make one mutation each; what flows between classes and techniques has to cancel,
+//! and so has what the mutation changes, on average, of where the path is.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod common;
+
+use common::{SIGMAS, rooms};
+use pathblend::film::{Health, PathClass};
+use pathblend::markov::Tracer;
+use pathblend::math::Stream;
+use pathblend::path_space::{Gain, Kind, Lengths, PathMutations, PathSpace, Proposed, Target, Weights};
+use pathblend::paths::{Found, FullPath, Techniques, connect_visible};
+use pathblend::scene::{Caster, Scene};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+const SIZE: usize = 8;
+const LENGTHS: Lengths = Lengths { least: 3, most: 5 };
+/// Paths in each of some batches.
+const PATHS: u64 = 8000;
+const BATCHES: u64 = 100;
+/// What fewer paths make is left alone: each way, since a flow of many paths that are worth little may come back as one that
+/// is worth much.
+const FEWEST: u64 = 30;
+
+/// A sum of what should cancel.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sum {
+    sum: f64,
+    squares: f64,
+    /// Of how many terms, and how many of these are below zero.
+    count: u64,
+    negative: u64,
+}
+
+impl Sum {
+    fn add(&mut self, value: f64) {
+        self.merge(&Self { sum: value, squares: value * value, count: 1, negative: u64::from(value < 0.0) });
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.sum += other.sum;
+        self.squares += other.squares;
+        self.count += other.count;
+        self.negative += other.negative;
+    }
+
+    /// Whether there is enough of it to be judged.
+    fn is_known(&self) -> bool {
+        self.negative.min(self.count - self.negative) >= FEWEST
+    }
+
+    /// The sum in its standard errors.
+    fn z(&self) -> f64 {
+        self.sum.abs() / self.squares.sqrt().max(f64::MIN_POSITIVE)
+    }
+}
+
+/// A class and a technique of it.
+type Cell = (PathClass, usize);
+
+/// What flows between two cells, and into what direction a quantity drifts, by its number.
+#[derive(Clone, Debug, Default)]
+struct Flows {
+    between: BTreeMap<[Cell; 2], Sum>,
+    drifts: [Sum; 10],
+}
+
+impl Flows {
+    fn merge(mut self, other: Self) -> Self {
+        for (cells, sum) in &other.between {
+            self.between.entry(*cells).or_default().merge(sum);
+        }
+        self.drifts.iter_mut().zip(&other.drifts).for_each(|(drift, other)| drift.merge(other));
+        self
+    }
+
+    /// A path of this `worth` goes on.
+    fn add(&mut self, target: Target, worth: f64, [from, to]: [(&Found, &FullPath); 2]) {
+        // A target of paths does not tell their techniques apart.
+        let cell = |found: &Found| (found.class, if target == Target::Technique { found.technique } else { 0 });
+        let (from_cell, to_cell) = (cell(from.0), cell(to.0));
+        if from_cell < to_cell {
+            self.between.entry([from_cell, to_cell]).or_default().add(worth);
+        } else if to_cell < from_cell {
+            self.between.entry([to_cell, from_cell]).or_default().add(-worth);
+        }
+        let [before, after] = [from, to].map(|(found, path)| places(found, path));
+        for (drift, (a, b)) in self.drifts.iter_mut().zip(after.into_iter().zip(before)) {
+            // What stays is off by rounding alone.
+            if (a - b).abs() > 1e-9 {
+                drift.add(worth * (a - b));
+            }
+        }
+    }
+}
+
+/// Where a path is: on the film, on the light, and the vertices next to its ends.
+fn places(found: &Found, path: &FullPath) -> [f64; 10] {
+    let [light, first, last] = [0, 1, path.edges() - 1].map(|m| path.position(m));
+    let along = |m: usize| (path.position(m) - path.position(m + 1)).length();
+    let (film, first_edge, last_edge) = (found.film / SIZE as f64, along(0), along(path.edges() - 1));
+    [film.x, film.y, light.x, light.z, first.x, first.y, last.x, last.z, first_edge, last_edge]
+}
+
+/// Each mutation alone, and each ten times as likely as the others.
+fn cases() -> Vec<(String, Vec<Kind>, Weights)> {
+    let alone = |kind: Kind| (kind.name().to_owned(), vec![kind], Weights::even(vec![kind].into()));
+    let favoured = |kind: Kind| {
+        let mut gains = [Gain::default(); Kind::ALL.len()];
+        gains[kind as usize].add(1.0, 0);
+        (format!("mostly {}", kind.name()), Kind::ALL.to_vec(), Weights::of(Kind::ALL.to_vec().into(), &gains))
+    };
+    Kind::ALL.into_iter().map(alone).chain(Kind::ALL.into_iter().map(favoured)).collect()
+}
+
+/// A path as chains of `target` have it, and what it is worth.
+fn draw(
+    target: Target,
+    edges: usize,
+    scene: &Caster<'_>,
+    stream: &mut Stream,
+    path: &mut FullPath,
+) -> Option<(Found, f64)> {
+    let found = Tracer { edges }.sample(scene, stream, path, &mut Health::default())?;
+    let worth = found.luminance;
+    if target == Target::Technique {
+        return Some((found, worth));
+    }
+    let alone = connect_visible(scene, &path.light.vertices, &path.camera.vertices, &Techniques::ALONE)?;
+    Some((Found { value: alone.value, luminance: alone.value.luminance(), ..found }, worth))
+}
+
+/// What flows, by case.
+fn flows(scene: &Scene, target: Target, lengths: Lengths, batch: u64) -> Vec<Flows> {
+    let caster = Caster::new(scene);
+    let [mut path, mut proposal] = [FullPath::default(), FullPath::default()];
+    let mut stream = Stream::new(9, &[batch, lengths.least as u64]);
+    let space = |(_, kinds, weights): (String, Vec<Kind>, Weights)| {
+        let mutations = PathMutations { kinds: kinds.into(), ..PathMutations::default() };
+        let mut space = PathSpace::new(mutations, target);
+        space.weights = weights;
+        (space, Flows::default())
+    };
+    let mut spaces: Vec<_> = cases().into_iter().map(space).collect();
+    for _ in 0..PATHS {
+        let edges = lengths.least + (stream.number() * lengths.count() as f64) as usize;
+        let Some((found, worth)) = draw(target, edges, &caster, &mut stream, &mut path) else { continue };
+        for (space, flows) in &mut spaces {
+            let Proposed { outcome, .. } = space.propose(&caster, (&path, &found), &mut stream, &mut proposal);
+            if let Ok((next, ratio)) = outcome {
+                flows.add(target, worth * ratio.min(1.0), [(&found, &path), (&next, &proposal)]);
+            }
+        }
+    }
+    spaces.into_iter().map(|(_, flows)| flows).collect()
+}
+
+fn balance(scene: &Scene) {
+    let one = |edges| (Target::Technique, Lengths { least: edges, most: edges });
+    let mut failures = Vec::new();
+    for (target, lengths) in [(Target::Path(LENGTHS), LENGTHS), one(3), one(4), one(5)] {
+        let batches = (0..BATCHES).into_par_iter().map(|batch| flows(scene, target, lengths, batch));
+        let merge = |a: Vec<Flows>, b: Vec<Flows>| a.into_iter().zip(b).map(|(a, b)| a.merge(b)).collect();
+        let all = batches.reduce(|| vec![Flows::default(); cases().len()], merge);
+        for ((name, ..), Flows { between, drifts }) in cases().into_iter().zip(&all) {
+            let flows = between.iter().map(|(cells, sum)| (format!("{cells:?}"), sum));
+            let drifts = drifts.iter().enumerate().map(|(number, sum)| (format!("drift {number}"), sum));
+            let judged: Vec<_> = flows.chain(drifts).filter(|(_, sum)| sum.is_known()).collect();
+            let Some((what, worst)) = judged.iter().max_by(|a, b| a.1.z().total_cmp(&b.1.z())) else { continue };
+            println!("| {target:?} | {lengths:?} | {name} | {} | {:.1} | {what} {worst:?}", judged.len(), worst.z());
+            if worst.z() > SIGMAS {
+                failures.push(format!("{target:?}, {lengths:?}, {name}: {what}: {:.1}", worst.z()));
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{failures:#?}");
+}
+
+#[test]
+fn flows_cancel_among_balls() {
+    balance(&rooms::balls(SIZE));
+}
+
+#[test]
+fn flows_cancel_under_water() {
+    balance(&rooms::water(SIZE));
+}
+
+#[test]
+fn flows_cancel_among_glossy_surfaces() {
+    balance(&rooms::polished(SIZE));
+}
