@@ -1,9 +1,10 @@
 //! Mutations per CPU second of one thread, and rays per mutation: `cargo bench --bench chains`.
 //!
 //! Each kind of mutation alone, on the box of this repository at 256×256 with paths of up to ten edges. All light but that
-//! seen directly is found by chains; the path tracing of the latter is measured by itself and taken off.
+//! seen directly is found by chains; the path tracing of the latter is measured by itself and taken off. A path of some
+//! edges takes as many rays: what is proposed may have fewer, where it finds no light.
 
-use pathblend::integrators::{Budget, Method, Settings, render};
+use pathblend::integrators::{Acceptance, Budget, Method, Settings, render};
 use pathblend::load;
 use pathblend::markov::{LargeSteps, Mutations};
 use pathblend::scene::Scene;
@@ -24,7 +25,11 @@ fn measure(scene: &Scene, name: &str, method: Method, mutations: Mutations) {
     let mutations = (outcome.counts.samples - seen.counts.samples) as f64;
     let time = outcome.cpu.saturating_sub(seen.cpu).as_secs_f64();
     let rays = (outcome.counts.rays - seen.counts.rays) as f64;
-    println!("| {name} | {} | {:.3} M | {:.2} |", method.name(), mutations / time / 1e6, rays / mutations);
+    let tried = || outcome.counts.acceptance.values().flatten().filter(|one| one.length > 0);
+    let sum = |value: fn(&Acceptance) -> u64| tried().map(value).sum::<u64>() as f64;
+    let edges = sum(|one| one.proposed * one.length as u64) / sum(|one| one.proposed);
+    let (rate, each) = (mutations / time / 1e6, rays / mutations);
+    println!("| {name} | {} | {rate:.3} M | {each:.2} | {edges:.2} |", method.name());
 }
 
 fn main() {
@@ -45,7 +50,7 @@ fn main() {
         ("controlled steps", Method::Rjmlt, Mutations { controlled: true, ..never }),
         ("tries", Method::Rjmlt, Mutations { large_steps: LargeSteps::TriesFrom(0), ..large }),
     ];
-    println!("| mutations | method | per CPU second | rays for each |\n|---|---|---|---|");
+    println!("| mutations | method | per CPU second | rays for each | edges |\n|---|---|---|---|---|");
     for (name, method, mutations) in cases {
         pool.install(|| measure(&loaded.scene, name, method, mutations));
     }
