@@ -1,4 +1,4 @@
-//! Mutations in path space are in detailed balance: as much goes from here to there as comes back. Independent paths, each
+//! Mutations in path space, and independent paths as proposals, are in detailed balance: as much goes from here to there as comes back. Independent paths, each
 //! worth what a chain's target has of it, make one mutation each; what flows between classes and techniques has to cancel,
 //! and so has what mutations change of paths of a class: where they are, and how much they contribute.
 
@@ -110,14 +110,15 @@ impl Flows {
 
 /// Where a path is, on the film, on the light and next to it, how long its edges are and how it bends, and the
 /// logarithm of its `contribution`.
-fn quantities(path: &FullPath, contribution: f64) -> [f64; 9] {
+fn quantities(path: &FullPath, contribution: f64) -> [f64; 10] {
     let edges = path.edges();
     let edge = |m: usize| path.position(m + 1) - path.position(m);
     let bend = |m: usize| edge(m - 1).normalize_or_zero().dot(edge(m).normalize_or_zero());
     let [light, first] = [0, 1].map(|m| path.position(m));
     let film = path.film / SIZE as f64;
     let (long, bends) = ((0..edges).map(|m| edge(m).length().ln()).sum(), (1..edges).map(bend).sum());
-    [film.x, film.y, light.x, light.z, first.x, first.y, long, bends, contribution]
+    let aside = (film - 0.5).length_squared();
+    [film.x, film.y, aside, light.x, light.z, first.x, first.y, long, bends, contribution]
 }
 
 /// Each mutation alone, and each ten times as likely as the others.
@@ -148,7 +149,7 @@ fn draw(
     Some((Found { value: alone.value, luminance: alone.value.luminance(), ..found }, worth))
 }
 
-/// What flows, by case.
+/// What flows, by case; and by independent paths.
 fn flows(scene: &Scene, target: Target, lengths: Lengths, batch: u64) -> Vec<Flows> {
     let caster = Caster::new(scene);
     let [mut path, mut proposal] = [FullPath::default(), FullPath::default()];
@@ -160,6 +161,7 @@ fn flows(scene: &Scene, target: Target, lengths: Lengths, batch: u64) -> Vec<Flo
         (space, Flows::default())
     };
     let mut spaces: Vec<_> = cases().into_iter().map(space).collect();
+    let (sampler, of_independent) = (&mut PathSpace::new(PathMutations::default(), target), &mut Flows::default());
     for _ in 0..PATHS {
         let edges = lengths.least + (stream.number() * lengths.count() as f64) as usize;
         let Some((found, worth)) = draw(target, edges, &caster, &mut stream, &mut path) else { continue };
@@ -169,8 +171,16 @@ fn flows(scene: &Scene, target: Target, lengths: Lengths, batch: u64) -> Vec<Flo
                 flows.add(target, worth * ratio.min(1.0), [(&found, &path), (&next, &proposal)]);
             }
         }
+        let edges = lengths.least + (stream.number() * lengths.count() as f64) as usize;
+        let (tracer, health) = (Tracer { edges }, &mut Health::default());
+        if let Some((next, to)) = sampler.sample(&caster, tracer, &mut stream, &mut proposal, health)
+            && let Some(from) = sampler.worth(&caster, (&path, &found))
+        {
+            of_independent.add(target, worth * (to / from).min(1.0), [(&found, &path), (&next, &proposal)]);
+        }
     }
-    spaces.into_iter().map(|(_, flows)| flows).collect()
+    let of_mutations = spaces.into_iter().map(|(_, flows)| flows);
+    of_mutations.chain([std::mem::take(of_independent)]).collect()
 }
 
 fn balance(scene: &Scene) {
@@ -179,8 +189,9 @@ fn balance(scene: &Scene) {
     for (target, lengths) in [(Target::Path(LENGTHS), LENGTHS), one(3), one(4), one(5)] {
         let batches = (0..BATCHES).into_par_iter().map(|batch| flows(scene, target, lengths, batch));
         let merge = |a: Vec<Flows>, b: Vec<Flows>| a.into_iter().zip(b).map(|(a, b)| a.merge(b)).collect();
-        let all = batches.reduce(|| vec![Flows::default(); cases().len()], merge);
-        for ((name, ..), Flows { between, drifts }) in cases().into_iter().zip(&all) {
+        let names: Vec<String> = cases().into_iter().map(|(name, ..)| name).chain(["independent".to_owned()]).collect();
+        let all = batches.reduce(|| vec![Flows::default(); names.len()], merge);
+        for (name, Flows { between, drifts }) in names.into_iter().zip(&all) {
             let flows = between.iter().map(|(cells, sum)| (format!("{cells:?}"), sum));
             let drifts = drifts.iter().map(|(drift, sum)| (format!("drift {drift:?}"), sum));
             let judged: Vec<_> = flows.chain(drifts).filter(|(_, sum)| sum.is_known()).collect();
@@ -207,4 +218,46 @@ fn flows_cancel_under_water() {
 #[test]
 fn flows_cancel_among_glossy_surfaces() {
     balance(&rooms::polished(SIZE));
+}
+
+/// The light of each class and length, by techniques and by independent paths.
+fn light(scene: &Scene, batch: u64) -> BTreeMap<(usize, PathClass), [Sum; 2]> {
+    let caster = Caster::new(scene);
+    let (mut stream, mut path, mut health) = (Stream::new(7, &[batch]), FullPath::default(), Health::default());
+    let mut space = PathSpace::new(PathMutations::default(), Target::Technique);
+    let mut light: BTreeMap<_, [Sum; 2]> = BTreeMap::new();
+    for _ in 0..PATHS {
+        for edges in LENGTHS.least..=LENGTHS.most {
+            let tracer = Tracer { edges };
+            if let Some(found) = tracer.sample(&caster, &mut stream, &mut path, &mut health) {
+                light.entry((edges, found.class)).or_default()[0].add(found.luminance);
+            }
+            if let Some((found, worth)) = space.sample(&caster, tracer, &mut stream, &mut path, &mut health) {
+                light.entry((edges, found.class)).or_default()[1].add(worth);
+            }
+        }
+    }
+    light
+}
+
+#[test]
+fn independent_paths_have_the_light_of_every_class() {
+    for scene in [rooms::balls(SIZE), rooms::water(SIZE), rooms::polished(SIZE)] {
+        let merge = |mut all: BTreeMap<_, [Sum; 2]>, other: BTreeMap<_, [Sum; 2]>| {
+            for (class, sums) in other {
+                all.entry(class).or_default().iter_mut().zip(&sums).for_each(|(sum, other)| sum.merge(other));
+            }
+            all
+        };
+        let light = (0..BATCHES).into_par_iter().map(|batch| light(&scene, batch)).reduce(BTreeMap::new, merge);
+        for ((edges, class), [techniques, independent]) in light {
+            if techniques.count.min(independent.count) < FEWEST {
+                continue;
+            }
+            let z = (techniques.sum - independent.sum).abs() / (techniques.squares + independent.squares).sqrt();
+            let [a, b] = [techniques, independent].map(|sum| format!("{:.1} ± {:.1}", sum.sum, sum.squares.sqrt()));
+            println!("| {edges} | {} | {a} | {b} | {z:.1} |", class.word());
+            assert!(z < SIGMAS, "{edges} edges, {}: {a}, {b}", class.word());
+        }
+    }
 }

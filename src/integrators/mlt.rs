@@ -14,27 +14,13 @@ use crate::manifold::Rejection;
 use crate::markov::Tracer;
 use crate::math::Stream;
 use crate::path_space::{Kind, Lengths, PathMutations, PathSpace, Proposed, Target};
-use crate::paths::{Found, FullPath, Techniques, connect_visible};
+use crate::paths::{Found, FullPath};
 use crate::scene::{Caster, Scene};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// Mutations for each independent sample that refines b.
 const REFINEMENT: usize = 16;
-
-/// A path of any of the lengths and techniques, all as likely, left in `path`; with its contribution over density.
-fn sample(
-    lengths: Lengths,
-    scene: &Caster<'_>,
-    stream: &mut Stream,
-    path: &mut FullPath,
-    health: &mut Health,
-) -> Option<Found> {
-    let count = lengths.count() as f64;
-    let edges = lengths.least + (stream.number() * count) as usize;
-    let found = Tracer { edges }.sample(scene, stream, path, health)?;
-    Some(Found { value: found.value * count, luminance: found.luminance * count, ..found })
-}
 
 struct Chain {
     stream: Stream,
@@ -68,6 +54,7 @@ pub(super) struct Mlt {
     seed: u64,
     direct: Path,
     lengths: Lengths,
+    mutations: PathMutations,
     size: [usize; 2],
     mean: Mean,
     worth: Worth,
@@ -84,6 +71,7 @@ impl Mlt {
             seed: settings.seed,
             direct: Path::up_to(settings, direct),
             lengths,
+            mutations: settings.mutations.path_space,
             size: scene.camera.size,
             mean: Mean::default(),
             worth: Worth::default(),
@@ -96,9 +84,9 @@ impl Mlt {
     fn sample(&mut self, scene: &Scene, samples: usize) -> u64 {
         let (seed, batch, lengths) = (self.seed, self.batches, self.lengths);
         let stream = |number: usize| Stream::new(seed, &[2, 0, batch, number as u64]);
-        let memory = || (FullPath::default(), Health::default());
-        let targets = independent(scene, samples, memory, |caster, (path, health), number| {
-            sample(lengths, caster, &mut stream(number), path, health).map_or(0.0, |found| found.luminance)
+        let memory = || Lane::new(self.mutations, Target::Path(lengths));
+        let targets = independent(scene, samples, memory, |caster, lane, number| {
+            lane.sample(caster, lengths, &mut stream(number)).map_or(0.0, |(_, worth)| worth)
         });
         self.batches += 1;
         targets.iter().for_each(|target| self.mean.add(*target));
@@ -155,15 +143,19 @@ impl Lane {
         Self { chain: None, mutations, proposal: FullPath::default(), health: Health::default() }
     }
 
+    /// An independent path of any of the lengths, all as likely, with what it is worth.
+    fn sample(&mut self, scene: &Caster<'_>, lengths: Lengths, stream: &mut Stream) -> Option<(Found, f64)> {
+        let count = lengths.count() as f64;
+        let tracer = Tracer { edges: lengths.least + (stream.number() * count) as usize };
+        let Self { mutations, proposal, health, .. } = self;
+        let (found, worth) = mutations.sample(scene, tracer, stream, proposal, health)?;
+        Some((found, worth * count))
+    }
+
     /// Begins at the sample that `draws` gives.
     fn start(&mut self, scene: &Caster<'_>, lengths: Lengths, draws: &mut Stream, stream: Stream) {
-        let mut path = FullPath::default();
-        let Some(found) = sample(lengths, scene, draws, &mut path, &mut self.health) else { return };
-        // Without the weight that its technique has among others.
-        let (light, camera) = (&path.light.vertices, &path.camera.vertices);
-        let Some(alone) = connect_visible(scene, light, camera, &Techniques::ALONE) else { return };
-        let current = Found { value: alone.value, luminance: alone.value.luminance(), ..found };
-        let (tallies, rejections) = (Default::default(), BTreeMap::new());
+        let Some((current, _)) = self.sample(scene, lengths, draws) else { return };
+        let (path, tallies, rejections) = (std::mem::take(&mut self.proposal), Default::default(), BTreeMap::new());
         self.chain = Some(Chain { stream, current, path, weight: 0.0, tallies, rejections });
     }
 

@@ -30,6 +30,13 @@ pub(super) fn suits(scene: &Caster<'_>, course: &Course) -> bool {
     scene.refracts() && (2..course.edges()).any(|d| is_free(course, d))
 }
 
+/// The first free vertex from the light on, if there are smooth boundaries before it: the one that the connection would have
+/// linked.
+pub(super) fn joint(course: &Course) -> Option<usize> {
+    let d = 1 + course.nodes[1..].iter().take_while(|node| node.delta).count();
+    (d > 1 && d < course.edges() && is_free(course, d)).then_some(d)
+}
+
 fn is_free(course: &Course, d: usize) -> bool {
     let node = &course.nodes[d];
     node.surface().is_some() && !node.delta
@@ -62,7 +69,13 @@ pub(super) fn propose(
 }
 
 /// Links x_d with a light.
-fn connect(scene: &Caster<'_>, old: &Course, d: usize, stream: &mut Stream, new: &mut Course) -> Result<(), Rejection> {
+pub(super) fn connect(
+    scene: &Caster<'_>,
+    old: &Course,
+    d: usize,
+    stream: &mut Stream,
+    new: &mut Course,
+) -> Result<(), Rejection> {
     let (id, start, _) = scene.sample_start(stream.row()).ok_or(Rejection::Unsuitable)?;
     let light = Node::light(id, start);
     let from = &old.nodes[d];
@@ -72,14 +85,9 @@ fn connect(scene: &Caster<'_>, old: &Course, d: usize, stream: &mut Stream, new:
         *node = Node::on(link.surface, true);
     }
     // What a walk from the camera meets there is the light as such a walk has it.
-    let last = &new.nodes[1];
-    let offset = light.position - last.position;
-    let direction = offset.normalize();
-    let lit = scene.intersect(last.leave(direction), direction).ok_or(Rejection::Dark)?;
-    if lit.emitter != Some(id) || lit.position.distance(light.position) > SAME * offset.length() {
-        return Err(Rejection::Dark);
-    }
-    (new.nodes[0], new.lit) = (Node::light(id, lit.start()), Some(lit));
+    (new.nodes[0], new.lit) = (light, None);
+    new.light_up(scene).ok_or(Rejection::Dark)?;
+    new.nodes[0] = Node::light(id, new.lit.ok_or(Rejection::Dark)?.start());
     Ok(())
 }
 
@@ -108,11 +116,11 @@ fn seeded(scene: &Caster<'_>, from: &Node, light: &Node, count: usize) -> Result
 }
 
 /// How likely the connection is, relative to the walk from the camera, to make of x_d the light's end that `course` has.
-pub(super) fn share(view: &View<'_>, course: &Course, d: usize, memory: &mut FullPath) -> f64 {
+pub(super) fn share(view: &View<'_>, course: &mut Course, d: usize, memory: &mut FullPath) -> f64 {
     density(view, course, d, memory).unwrap_or(0.0)
 }
 
-fn density(view: &View<'_>, course: &Course, d: usize, memory: &mut FullPath) -> Option<f64> {
+fn density(view: &View<'_>, course: &mut Course, d: usize, memory: &mut FullPath) -> Option<f64> {
     let (scene, light, from) = (view.scene, &course.nodes[0], &course.nodes[d]);
     if !course.nodes[1..d].iter().all(|node| node.delta) {
         return None;
@@ -124,6 +132,7 @@ fn density(view: &View<'_>, course: &Course, d: usize, memory: &mut FullPath) ->
     if !chain.surfaces().zip(course.nodes[1..d].iter().rev()).all(same) {
         return None;
     }
+    course.light_up(scene)?;
     memory.assemble(scene, course, 0)?;
     let walked: f64 = (0..d).map(|m| memory.camera.vertices[course.edges() - m].forward.0).product();
     let gamma = Part { course, from: d, to: 0, walk: Walk::FromCamera }.gamma(scene).ok()?;

@@ -47,6 +47,7 @@ mod multi_chain;
 mod perturb;
 mod retrace;
 mod steps;
+mod whole;
 
 pub use bidirectional::Lengths;
 pub use gains::{Gain, Weights, way};
@@ -152,6 +153,18 @@ impl Target {
             Self::Technique => TECHNIQUES,
             Self::Path(_) => Techniques::ALONE,
         }
+    }
+
+    /// The weight of a technique among others with these densities.
+    fn weight(self, densities: &[f64], technique: usize) -> f64 {
+        let Some(heuristic) = self.techniques().heuristic else { return 1.0 };
+        heuristic.apply(densities[technique]) / densities.iter().map(|density| heuristic.apply(*density)).sum::<f64>()
+    }
+
+    /// Draws a technique by the weights, if there are any.
+    fn pick(self, densities: &[f64], stream: &mut Stream) -> Option<usize> {
+        let heuristic = self.techniques().heuristic?;
+        pick(densities.iter().map(|density| heuristic.apply(*density)), stream.number())
     }
 
     /// What the contribution of a technique is multiplied by.
@@ -351,27 +364,19 @@ impl PathSpace {
         proposal: &mut FullPath,
     ) -> Option<(Found, f64)> {
         let Self { old, new, densities, target, walked, .. } = self;
-        let heuristic = target.techniques().heuristic;
-        let weight = |densities: &[f64], technique: usize| {
-            let Some(heuristic) = heuristic else { return 1.0 };
-            heuristic.apply(densities[technique])
-                / densities.iter().map(|density| heuristic.apply(*density)).sum::<f64>()
-        };
         // The density of the mutation in units of that of the technique, but for what stays.
-        let mut density = |course: &Course, densities: &[f64]| {
+        let mut density = |course: &mut Course, densities: &[f64]| {
             let sampled = densities[..=d].iter().sum::<f64>();
             sampled + (d + 1) as f64 * densities[0] * connection::share(view, course, d, walked)
         };
         path.densities(densities);
-        let alone = current.luminance / (target.count(old) * weight(densities, current.technique));
+        let alone = current.luminance / (target.count(old) * target.weight(densities, current.technique));
         let before = alone / density(old, densities);
 
         let mut found = realise(view.scene, new, draft.technique, (&Techniques::ALONE, 1.0), proposal)?;
         proposal.densities(densities);
         let ratio = found.luminance / density(new, densities) / before;
-        if let Some(heuristic) = heuristic {
-            let weights = densities.iter().map(|density| heuristic.apply(*density));
-            let technique = pick(weights, stream.number())?;
+        if let Some(technique) = target.pick(densities, stream) {
             found = realise(view.scene, new, technique, (&target.techniques(), target.count(new)), proposal)?;
         }
         (ratio.is_finite()).then_some((found, ratio))
@@ -386,6 +391,9 @@ fn realise(
     (techniques, count): (&Techniques, f64),
     path: &mut FullPath,
 ) -> Option<Found> {
+    if technique == 0 {
+        course.light_up(scene)?;
+    }
     path.assemble(scene, course, technique)?;
     let connection = connect_visible(scene, &path.light.vertices, &path.camera.vertices, techniques)?;
     let value = connection.value * count;

@@ -6,7 +6,7 @@
 
 use super::full::FullPath;
 use super::mis::Junction;
-use super::subpath::{Subpath, VertexKind};
+use super::subpath::{Subpath, Vertex, VertexKind};
 use super::trace::{
     Walker, environment_vertex, go_on, light_offset, on_lens, on_light, shading_correction, surface_vertex,
 };
@@ -16,6 +16,9 @@ use crate::math::Walk;
 use crate::scene::{Caster, EmitterId, Origin, Scene, Surface};
 use crate::spectrum::Spectrum;
 use glam::{DVec2, DVec3};
+
+/// How far off a point of a light may be met, relative to the distance.
+const SAME: f64 = 1e-7;
 
 /// A vertex of a path, whatever walk has found it.
 #[derive(Clone, Copy, Debug)]
@@ -124,6 +127,18 @@ impl Course {
         true
     }
 
+    /// Becomes a course of `edges` edges that ends as the camera's `walk` begins; the vertices before are yet to be set.
+    pub fn begin(&mut self, walk: &Subpath, edges: usize) {
+        let node = |vertex: &Vertex| {
+            let Vertex { kind, position, delta, .. } = *vertex;
+            Node { kind, position, delta, linked: delta }
+        };
+        (self.film, self.lit) = (walk.film, None);
+        self.nodes.clear();
+        self.nodes.resize(edges + 1 - walk.vertices.len(), Node::lens(DVec3::ZERO));
+        self.nodes.extend(walk.vertices.iter().rev().map(node));
+    }
+
     /// Unit vector from x_m to x_{m+1}.
     pub fn direction(&self, scene: &Scene, m: usize) -> Option<DVec3> {
         let (from, to) = (&self.nodes[m], &self.nodes[m + 1]);
@@ -141,6 +156,21 @@ impl Course {
         let sight = scene.camera.sight(self.nodes[k].position, self.nodes[k - 1].position)?;
         (self.film, self.nodes[k]) = (sight.film, Node::lens(sight.lens));
         Some(())
+    }
+
+    /// Finds what a walk from the camera meets at x_0, if that is not known; `None` where it meets something else.
+    pub fn light_up(&mut self, scene: &Caster<'_>) -> Option<()> {
+        let (light, next) = (&self.nodes[0], &self.nodes[1]);
+        let VertexKind::Light(id, Start::Surface { .. }) = light.kind else { return Some(()) };
+        if self.lit.is_some() {
+            return Some(());
+        }
+        let offset = light.position - next.position;
+        let direction = offset.try_normalize()?;
+        let met = scene.intersect(next.leave(direction), direction)?;
+        let is_there = met.emitter == Some(id) && met.position.distance(light.position) <= SAME * offset.length();
+        self.lit = is_there.then_some(met);
+        self.lit.map(|_| ())
     }
 
     /// Whether nothing lies between x_m and x_{m+1}.

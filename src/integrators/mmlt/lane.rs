@@ -3,7 +3,6 @@
 use super::super::chains::Mean;
 use super::{Family, Share};
 use crate::film::{Health, Kernel, Splats};
-use crate::manifold::Rejection;
 use crate::markov::{
     ChainState, ControlledMemory, Jump, JumpMemory, Jumps, Mutations, Tracer, Tries, controlled_step, jump, retell,
 };
@@ -48,9 +47,14 @@ pub(super) struct Chain {
 }
 
 impl Chain {
-    pub(super) fn new(state: ChainState, stream: Stream, current: Found, path: FullPath) -> Self {
+    fn new(state: ChainState, stream: Stream, current: Found, path: FullPath) -> Self {
         let (tallies, rejections) = (Default::default(), BTreeMap::new());
         Self { state, stream, current, weight: 0.0, path, tallies, failed: 0, rejections }
+    }
+
+    /// Counts a mutation in path space that came to nothing.
+    fn reject(&mut self, cause: &'static str) {
+        *self.rejections.entry(cause).or_default() += 1;
     }
 
     fn tally(&mut self, kind: usize, accepted: bool) {
@@ -133,9 +137,33 @@ impl Lane {
         }
     }
 
-    /// The path that was found last.
-    pub(super) fn take_proposal(&mut self) -> FullPath {
-        std::mem::take(&mut self.proposal)
+    /// Whether independent paths come about by connections over manifolds as well.
+    pub(super) fn links(&self, scene: &Caster<'_>) -> bool {
+        self.family == Family::Fused && self.mutations.path_space.links(scene)
+    }
+
+    /// An independent path, with what it is worth.
+    pub(super) fn draw(&mut self, scene: &Caster<'_>, tracer: Tracer, stream: &mut Stream) -> Option<(Found, f64)> {
+        self.path_space.sample(scene, tracer, stream, &mut self.proposal, &mut self.health)
+    }
+
+    /// A chain that begins at the independent path that `draws` gives; `None` where its rows cannot be found.
+    pub(super) fn start(
+        &mut self,
+        scene: &Caster<'_>,
+        tracer: Tracer,
+        mut state: ChainState,
+        mut draws: Stream,
+        mut stream: Stream,
+    ) -> Option<Chain> {
+        let found = if self.links(scene) {
+            let (found, _) = self.draw(scene, tracer, &mut draws)?;
+            self.confirm(scene, tracer, found, found.technique, &mut state, &mut stream).ok()?
+        } else {
+            self.find(scene, tracer, &mut state, &mut draws)?
+        };
+        state.accept();
+        Some(Chain::new(state, stream, found, std::mem::take(&mut self.proposal)))
     }
 
     /// The path of the state's proposal, whose technique a number of the state chooses.
@@ -206,9 +234,12 @@ impl Lane {
         let kind = chain.stream.number();
         let large = self.mutations.large_step;
         if kind < large {
-            return match self.mutations.tries(work.tracer.edges) {
-                true => self.try_all(chain, work),
-                false => self.large_step(chain, work),
+            return if self.mutations.tries(work.tracer.edges) {
+                self.try_all(chain, work);
+            } else if self.links(work.scene) {
+                self.independent_step(chain, work);
+            } else {
+                self.large_step(chain, work);
             };
         }
         if self.family != Family::Multiplexed {
@@ -283,37 +314,55 @@ impl Lane {
 
     /// A mutation in path space, of a path that keeps its technique (Otsu 2017, algorithm 1 of chapter 6).
     fn path_step(&mut self, chain: &mut Chain, work: &mut Work<'_>) {
-        let Chain { state, stream, current, path, rejections, .. } = chain;
+        let Chain { stream, current, path, .. } = chain;
         let Proposed { kind, outcome } =
             self.path_space.propose(work.scene, (path, current), stream, &mut self.proposal);
         let Some(kind) = kind else {
             chain.weight += 1.0;
             return;
         };
-        state.propose(false);
-        let (number, technique) = (stream.number(), current.technique);
-        // Rows are wanted of what is about to be accepted alone.
-        let confirmed = outcome.map_err(Rejection::name).and_then(|(found, ratio)| match number < ratio {
-            true => Ok((self.confirm(work, found, technique, state, stream)?, ratio)),
-            false => Ok((found, ratio)),
+        let proposal = outcome.map_err(|cause| chain.reject(cause.name())).ok();
+        self.move_path(chain, PRIMARY.len() + kind as usize, proposal, work);
+    }
+
+    /// A large step in path space.
+    fn independent_step(&mut self, chain: &mut Chain, work: &mut Work<'_>) {
+        let drawn = self.draw(work.scene, work.tracer, &mut chain.stream);
+        work.large_steps.add(drawn.map_or(0.0, |(_, worth)| worth));
+        let proposal = drawn.and_then(|(found, worth)| {
+            let before = self.path_space.worth(work.scene, (&chain.path, &chain.current))?;
+            Some((found, worth / before))
         });
-        if let Err(cause) = confirmed {
-            *rejections.entry(cause).or_default() += 1;
-        }
-        self.decide(chain, PRIMARY.len() + kind as usize, confirmed.ok(), number, work);
+        self.move_path(chain, LARGE, proposal, work);
+    }
+
+    /// Accepts or rejects what path space proposes, which comes with its acceptance.
+    fn move_path(&mut self, chain: &mut Chain, kind: usize, proposal: Option<(Found, f64)>, work: &mut Work<'_>) {
+        chain.state.propose(false);
+        let (number, technique) = (chain.stream.number(), chain.current.technique);
+        // Rows are wanted of what is about to be accepted alone.
+        let confirmed = proposal.and_then(|(found, ratio)| {
+            if number >= ratio {
+                return Some((found, ratio));
+            }
+            let Chain { state, stream, .. } = chain;
+            let confirmed = self.confirm(work.scene, work.tracer, found, technique, state, stream);
+            Some((confirmed.map_err(|cause| chain.reject(cause)).ok()?, ratio))
+        });
+        self.decide(chain, kind, confirmed, number, work);
     }
 
     /// Has the state, whose technique is `from`, lead to the proposal `found`; that must also be what its rows lead to (Otsu
     /// 2017, section 6.7.1). Fails with the cause.
     fn confirm(
         &mut self,
-        work: &Work<'_>,
+        scene: &Caster<'_>,
+        tracer: Tracer,
         found: Found,
         from: usize,
         state: &mut ChainState,
         stream: &mut Stream,
     ) -> Result<Found, &'static str> {
-        let Work { scene, tracer, .. } = *work;
         let Self { proposal, returned, health, .. } = self;
         retell(scene, proposal, from, state, stream).ok_or("inversion")?;
         let back = tracer.find(scene, found.technique, state, stream, returned, health);

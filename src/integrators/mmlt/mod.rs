@@ -20,7 +20,7 @@ use crate::math::{Stream, Walk};
 use crate::path_space::{Gain, Weights};
 use crate::paths::Open;
 use crate::scene::{Caster, Scene};
-use lane::{Chain, Job, Lane};
+use lane::{Job, Lane};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -102,20 +102,21 @@ impl Mmlt {
         let key = |sample: usize| [2, edges, batches, sample as u64];
         let state = ChainState::new(self.mutations.small_step, length.scales.clone());
         let samples = batch_samples(self.size, batches).div_ceil(count);
-        let memory = || (Lane::new(Family::Multiplexed, self.mutations, 0), state.clone());
+        let memory = || (Lane::new(self.family, self.mutations, 0), state.clone());
         let targets = independent(scene, samples, memory, |caster, (lane, state), sample| {
+            let mut stream = Stream::new(self.seed, &key(sample));
+            if lane.links(caster) {
+                return lane.draw(caster, tracer, &mut stream).map_or(0.0, |(_, worth)| worth);
+            }
             state.reset();
-            let found = lane.find(caster, tracer, state, &mut Stream::new(self.seed, &key(sample)));
-            found.map_or(0.0, |found| found.luminance)
+            lane.find(caster, tracer, state, &mut stream).map_or(0.0, |found| found.luminance)
         });
         length.batches += 1;
         targets.iter().for_each(|target| length.mean.add(*target));
         let caster = Caster::new(scene);
         for (lane, (chosen, stream)) in self.lanes.iter_mut().zip(starts(&targets, self.seed, edges)) {
-            let (mut state, mut draws) = (state.clone(), Stream::new(self.seed, &key(chosen)));
-            let current = lane.find(&caster, tracer, &mut state, &mut draws);
-            state.accept();
-            lane.chains[index] = current.map(|current| Chain::new(state, stream, current, lane.take_proposal()));
+            let draws = Stream::new(self.seed, &key(chosen));
+            lane.chains[index] = lane.start(&caster, tracer, state.clone(), draws, stream);
         }
         if self.family == Family::Fused && self.mutations.path_step > 0.0 {
             self.adapt(scene, kernel, index);
