@@ -40,6 +40,8 @@ mod caustic;
 mod connection;
 mod gains;
 mod gamma;
+mod judge;
+mod kinds;
 mod lens;
 mod link;
 mod manifold;
@@ -51,92 +53,16 @@ mod whole;
 
 pub use bidirectional::Lengths;
 pub use gains::{Gain, Weights, way};
+pub use kinds::{Kind, Kinds, PathMutations};
 pub use steps::Radii;
+
+use judge::realise;
 
 use crate::manifold::Rejection;
 use crate::math::{Stream, Walk, pick};
-use crate::paths::{Course, Found, FullPath, Node, TECHNIQUES, Techniques, connect_visible};
+use crate::paths::{Course, Found, FullPath, Node, TECHNIQUES, Techniques};
 use crate::scene::{Caster, Scene};
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
-
-/// The mutations.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[serde(rename_all = "snake_case")]
-pub enum Kind {
-    /// Part of the path is sampled anew.
-    Bidirectional,
-    /// The film position moves.
-    Lens,
-    /// The last part of a caustic moves.
-    Caustic,
-    /// The film position moves, and directions further on.
-    MultiChain,
-    /// A vertex moves, and a chain follows.
-    Manifold,
-    /// A vertex is connected with a light through smooth boundaries.
-    Connection,
-}
-
-impl Kind {
-    /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::Bidirectional, Self::Lens, Self::Caustic, Self::MultiChain, Self::Manifold, Self::Connection];
-
-    /// The name, as reports have it.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Bidirectional => "bidirectional",
-            Self::Lens => "lens_perturbation",
-            Self::Caustic => "caustic_perturbation",
-            Self::MultiChain => "multi_chain_perturbation",
-            Self::Manifold => "manifold_perturbation",
-            Self::Connection => "manifold_connection",
-        }
-    }
-}
-
-/// Some of the mutations.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(into = "Vec<Kind>", from = "Vec<Kind>")]
-pub struct Kinds([bool; Kind::ALL.len()]);
-
-impl Kinds {
-    /// Whether `kind` is one of them.
-    pub const fn has(self, kind: Kind) -> bool {
-        self.0[kind as usize]
-    }
-}
-
-impl From<Vec<Kind>> for Kinds {
-    fn from(kinds: Vec<Kind>) -> Self {
-        Self(Kind::ALL.map(|kind| kinds.contains(&kind)))
-    }
-}
-
-impl From<Kinds> for Vec<Kind> {
-    fn from(kinds: Kinds) -> Self {
-        Kind::ALL.into_iter().filter(|kind| kinds.has(*kind)).collect()
-    }
-}
-
-/// Which mutations there are, and how far they go.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct PathMutations {
-    /// Those that may be drawn.
-    pub kinds: Kinds,
-    /// How far directions move, in radians.
-    pub angles: Radii,
-    /// Roughness α below which a vertex that has nothing but one microfacet lobe is one of a chain: it keeps its half-vector.
-    pub glossy: f64,
-}
-
-impl Default for PathMutations {
-    fn default() -> Self {
-        Self { kinds: Kinds([true; Kind::ALL.len()]), angles: Radii { least: 1e-4, most: 0.1 }, glossy: 0.1 }
-    }
-}
 
 /// What a chain's target is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -329,83 +255,6 @@ impl PathSpace {
         let ratio = perturb::propose(view, old, plan, stream, new)?;
         Ok(Draft { technique, ratio, ranges: None, linked: None })
     }
-
-    /// What the new course contributes, and the acceptance; `None` where it carries no light.
-    fn judge(
-        &mut self,
-        scene: &Caster<'_>,
-        draft: &Draft,
-        (path, current): (&FullPath, &Found),
-        proposal: &mut FullPath,
-    ) -> Option<(Found, f64)> {
-        let Self { new, densities, target, .. } = self;
-        let found = realise(scene, new, draft.technique, (&target.techniques(), target.count(new)), proposal)?;
-        // The density of both paths, as far as T leaves something of it.
-        let mut density = |path: &FullPath, which: usize| match draft.ranges {
-            None => path.density(),
-            Some(ranges) => {
-                path.densities(densities);
-                1.0 / densities[ranges[which].techniques()].iter().sum::<f64>()
-            }
-        };
-        let ratio = found.luminance / current.luminance * density(proposal, 1) / density(path, 0) * draft.ratio;
-        // Neither infinite nor NaN: a path whose density is none at all was not found by this technique.
-        (ratio.is_finite()).then_some((found, ratio))
-    }
-
-    /// [`PathSpace::judge`], for a path whose light's end was replaced below x_d. It may take another technique: one is drawn
-    /// by the weights, as jumps do, so that the acceptance has f in place of C.
-    fn judge_linked(
-        &mut self,
-        view: &View<'_>,
-        (draft, d): (&Draft, usize),
-        (path, current): (&FullPath, &Found),
-        stream: &mut Stream,
-        proposal: &mut FullPath,
-    ) -> Option<(Found, f64)> {
-        let Self { old, new, densities, target, walked, .. } = self;
-        // The density of the mutation in units of that of the technique, but for what stays.
-        let mut density = |course: &mut Course, densities: &[f64]| {
-            let sampled = densities[..=d].iter().sum::<f64>();
-            sampled + (d + 1) as f64 * densities[0] * connection::share(view, course, d, walked)
-        };
-        path.densities(densities);
-        let alone = current.luminance / (target.count(old) * target.weight(densities, current.technique));
-        let before = alone / density(old, densities);
-
-        let mut found = realise(view.scene, new, draft.technique, (&Techniques::ALONE, 1.0), proposal)?;
-        proposal.densities(densities);
-        let ratio = found.luminance / density(new, densities) / before;
-        if let Some(technique) = target.pick(densities, stream) {
-            found = realise(view.scene, new, technique, (&target.techniques(), target.count(new)), proposal)?;
-        }
-        (ratio.is_finite()).then_some((found, ratio))
-    }
-}
-
-/// What `course` contributes by a technique, times `count`, with the path as that finds it; `None` where that is nothing.
-fn realise(
-    scene: &Caster<'_>,
-    course: &mut Course,
-    technique: usize,
-    (techniques, count): (&Techniques, f64),
-    path: &mut FullPath,
-) -> Option<Found> {
-    if technique == 0 {
-        course.light_up(scene)?;
-    }
-    path.assemble(scene, course, technique)?;
-    let connection = connect_visible(scene, &path.light.vertices, &path.camera.vertices, techniques)?;
-    let value = connection.value * count;
-    let luminance = value.luminance();
-    // Of a path that a technique can hardly find the contribution may be beyond numbers: it is no proposal.
-    if !(value.is_valid() && luminance > 0.0) {
-        return None;
-    }
-    path.film = connection.film.unwrap_or(path.film);
-    course.film = path.film;
-    path.junction = connection.junction;
-    Some(Found { value, luminance, class: connection.class, film: path.film, technique })
 }
 
 /// The weights of the mutations that suit a course, 0 for others.

@@ -1,68 +1,16 @@
 //! The chains of one lane, and what they do in a pass.
 
 use super::super::chains::Mean;
+use super::chain::{CHANGE, Chain, KINDS, LARGE, SMALL};
 use super::{Family, Share};
 use crate::film::{Health, Kernel, Splats};
 use crate::markov::{
-    ChainState, ControlledMemory, Jump, JumpMemory, Jumps, Mutations, Tracer, Tries, controlled_step, jump, retell,
+    ChainState, ControlledMemory, Jump, JumpMemory, Jumps, Mutations, Tracer, Tries, controlled_step, jump,
 };
 use crate::math::Stream;
-use crate::path_space::{Gain, Kind, PathSpace, Proposed, Target, way};
+use crate::path_space::{Gain, PathSpace, Target, way};
 use crate::paths::{Found, FullPath};
 use crate::scene::{Caster, Scene};
-use std::collections::BTreeMap;
-
-/// The mutations in primary sample space; those in path space come after them.
-pub(super) const PRIMARY: [&str; 3] = ["large_step", "small_step", "technique_change"];
-const LARGE: usize = 0;
-const SMALL: usize = 1;
-const CHANGE: usize = 2;
-/// How many kinds of mutations there are.
-pub(super) const KINDS: usize = PRIMARY.len() + Kind::ALL.len();
-
-/// Names of all kinds, in the order of their tallies.
-pub(super) fn names() -> impl Iterator<Item = &'static str> {
-    PRIMARY.into_iter().chain(Kind::ALL.map(Kind::name))
-}
-
-/// How far the target may be off, relative to itself, after the way to rows and back.
-const ROUND_TRIP: f64 = 1e-6;
-
-/// One chain.
-#[derive(Clone)]
-pub(super) struct Chain {
-    state: ChainState,
-    stream: Stream,
-    current: Found,
-    /// How often the current path has been counted and not yet been splatted.
-    weight: f64,
-    /// The path of `current`, as the technique that it came by has found it.
-    path: FullPath,
-    /// By kind, proposals and accepted ones. Technique changes of `mmlt` are among its small steps too.
-    pub tallies: [[u64; 2]; KINDS],
-    /// Jumps for which no rows could be found.
-    pub failed: u64,
-    /// Mutations in path space that came to nothing, by cause.
-    pub rejections: BTreeMap<&'static str, u64>,
-}
-
-impl Chain {
-    fn new(state: ChainState, stream: Stream, current: Found, path: FullPath) -> Self {
-        let (tallies, rejections) = (Default::default(), BTreeMap::new());
-        Self { state, stream, current, weight: 0.0, path, tallies, failed: 0, rejections }
-    }
-
-    /// Counts a mutation in path space that came to nothing.
-    fn reject(&mut self, cause: &'static str) {
-        *self.rejections.entry(cause).or_default() += 1;
-    }
-
-    fn tally(&mut self, kind: usize, accepted: bool) {
-        let [proposals, successes] = &mut self.tallies[kind];
-        *proposals += 1;
-        *successes += u64::from(accepted);
-    }
-}
 
 /// What mutations bring, by their kind.
 #[derive(Clone, Copy, Default)]
@@ -85,30 +33,30 @@ pub(super) struct Job {
 pub(super) struct Lane {
     /// By length; `None` where no light has been found yet.
     pub chains: Vec<Option<Chain>>,
-    family: Family,
-    mutations: Mutations,
-    health: Health,
-    proposal: FullPath,
+    pub family: Family,
+    pub mutations: Mutations,
+    pub health: Health,
+    pub proposal: FullPath,
     tries: Tries,
     jumps: JumpMemory,
     controlled: ControlledMemory,
-    path_space: PathSpace,
+    pub path_space: PathSpace,
     /// Whether it is a pilot run.
     pilot: Option<Pilot>,
     /// What the rows of a path lead to.
-    returned: FullPath,
+    pub returned: FullPath,
 }
 
 /// What the mutations of one length work on in a pass.
-struct Work<'a> {
-    scene: &'a Caster<'a>,
-    tracer: Tracer,
+pub(super) struct Work<'a> {
+    pub scene: &'a Caster<'a>,
+    pub tracer: Tracer,
     kernel: &'a Kernel,
     splats: &'a mut Splats,
     /// What one mutation adds.
     worth: f64,
     /// What large steps found.
-    large_steps: Mean,
+    pub large_steps: Mean,
 }
 
 impl Work<'_> {
@@ -135,35 +83,6 @@ impl Lane {
             pilot: None,
             returned: FullPath::default(),
         }
-    }
-
-    /// Whether independent paths come about by connections over manifolds as well.
-    pub(super) fn links(&self, scene: &Caster<'_>) -> bool {
-        self.family == Family::Fused && self.mutations.path_space.links(scene)
-    }
-
-    /// An independent path, with what it is worth.
-    pub(super) fn draw(&mut self, scene: &Caster<'_>, tracer: Tracer, stream: &mut Stream) -> Option<(Found, f64)> {
-        self.path_space.sample(scene, tracer, stream, &mut self.proposal, &mut self.health)
-    }
-
-    /// A chain that begins at the independent path that `draws` gives; `None` where its rows cannot be found.
-    pub(super) fn start(
-        &mut self,
-        scene: &Caster<'_>,
-        tracer: Tracer,
-        mut state: ChainState,
-        mut draws: Stream,
-        mut stream: Stream,
-    ) -> Option<Chain> {
-        let found = if self.links(scene) {
-            let (found, _) = self.draw(scene, tracer, &mut draws)?;
-            self.confirm(scene, tracer, found, found.technique, &mut state, &mut stream).ok()?
-        } else {
-            self.find(scene, tracer, &mut state, &mut draws)?
-        };
-        state.accept();
-        Some(Chain::new(state, stream, found, std::mem::take(&mut self.proposal)))
     }
 
     /// The path of the state's proposal, whose technique a number of the state chooses.
@@ -312,66 +231,6 @@ impl Lane {
         }
     }
 
-    /// A mutation in path space, of a path that keeps its technique (Otsu 2017, algorithm 1 of chapter 6).
-    fn path_step(&mut self, chain: &mut Chain, work: &mut Work<'_>) {
-        let Chain { stream, current, path, .. } = chain;
-        let Proposed { kind, outcome } =
-            self.path_space.propose(work.scene, (path, current), stream, &mut self.proposal);
-        let Some(kind) = kind else {
-            chain.weight += 1.0;
-            return;
-        };
-        let proposal = outcome.map_err(|cause| chain.reject(cause.name())).ok();
-        self.move_path(chain, PRIMARY.len() + kind as usize, proposal, work);
-    }
-
-    /// A large step in path space.
-    fn independent_step(&mut self, chain: &mut Chain, work: &mut Work<'_>) {
-        let drawn = self.draw(work.scene, work.tracer, &mut chain.stream);
-        work.large_steps.add(drawn.map_or(0.0, |(_, worth)| worth));
-        let proposal = drawn.and_then(|(found, worth)| {
-            let before = self.path_space.worth(work.scene, (&chain.path, &chain.current))?;
-            Some((found, worth / before))
-        });
-        self.move_path(chain, LARGE, proposal, work);
-    }
-
-    /// Accepts or rejects what path space proposes, which comes with its acceptance.
-    fn move_path(&mut self, chain: &mut Chain, kind: usize, proposal: Option<(Found, f64)>, work: &mut Work<'_>) {
-        chain.state.propose(false);
-        let (number, technique) = (chain.stream.number(), chain.current.technique);
-        // Rows are wanted of what is about to be accepted alone.
-        let confirmed = proposal.and_then(|(found, ratio)| {
-            if number >= ratio {
-                return Some((found, ratio));
-            }
-            let Chain { state, stream, .. } = chain;
-            let confirmed = self.confirm(work.scene, work.tracer, found, technique, state, stream);
-            Some((confirmed.map_err(|cause| chain.reject(cause)).ok()?, ratio))
-        });
-        self.decide(chain, kind, confirmed, number, work);
-    }
-
-    /// Has the state, whose technique is `from`, lead to the proposal `found`; that must also be what its rows lead to (Otsu
-    /// 2017, section 6.7.1). Fails with the cause.
-    fn confirm(
-        &mut self,
-        scene: &Caster<'_>,
-        tracer: Tracer,
-        found: Found,
-        from: usize,
-        state: &mut ChainState,
-        stream: &mut Stream,
-    ) -> Result<Found, &'static str> {
-        let Self { proposal, returned, health, .. } = self;
-        retell(scene, proposal, from, state, stream).ok_or("inversion")?;
-        let back = tracer.find(scene, found.technique, state, stream, returned, health);
-        let same = |back: &Found| (back.luminance / found.luminance - 1.0).abs() < ROUND_TRIP;
-        let back = back.filter(same).ok_or("round_trip")?;
-        std::mem::swap(proposal, returned);
-        Ok(back)
-    }
-
     /// A large step among all techniques.
     fn try_all(&mut self, chain: &mut Chain, work: &mut Work<'_>) {
         let Chain { state, stream, current, .. } = chain;
@@ -392,7 +251,7 @@ impl Lane {
 
     /// Accepts the proposal, which comes with its acceptance, if `number` is less than that; says whether.
     #[inline]
-    fn decide(
+    pub(super) fn decide(
         &mut self,
         chain: &mut Chain,
         kind: usize,

@@ -10,7 +10,9 @@
 //! Light seen directly is rendered by path tracing, and so is direct light unless the settings say otherwise, as in both
 //! papers.
 
+mod chain;
 mod lane;
+mod path_steps;
 
 use super::chains::{LANES, Mean, Worth, batch_samples, independent, share, starts};
 use super::{Acceptance, ChainReport, Counts, path::Path, render::Settings};
@@ -134,11 +136,11 @@ impl Mmlt {
             lane.pilot(scene, kernel, size, (index, tracer), (mutations, stream)).gains
         };
         let runs: Vec<_> = self.lanes.par_iter_mut().enumerate().map(run).collect();
-        let mut gains = [Gain::default(); lane::KINDS];
+        let mut gains = [Gain::default(); chain::KINDS];
         for run in &runs {
             gains.iter_mut().zip(run).for_each(|(gain, other)| gain.merge(other));
         }
-        let path = std::array::from_fn(|kind| gains[lane::PRIMARY.len() + kind]);
+        let path = std::array::from_fn(|kind| gains[chain::PRIMARY.len() + kind]);
         length.weights = Weights::of(kinds, &path);
     }
 
@@ -184,14 +186,14 @@ impl Mmlt {
     /// What the chains have done so far, summed over the lanes.
     fn report(&self, counts: &mut Counts) {
         let chains = |index: usize| self.lanes.iter().filter_map(move |lane| lane.chains[index].as_ref());
-        for (kind, name) in lane::names().enumerate() {
+        for (kind, name) in chain::names().enumerate() {
             let sum = |(index, length): (usize, &Length)| {
                 let tallies = chains(index).map(|chain| chain.tallies[kind]);
                 let [proposed, accepted] = tallies.fold([0; 2], |[a, b], tally| [a + tally[0], b + tally[1]]);
                 Acceptance { length: length.tracer.edges, proposed, accepted }
             };
             let lengths: Vec<Acceptance> = self.lengths.iter().enumerate().map(sum).collect();
-            if kind < lane::PRIMARY.len() || lengths.iter().any(|length| length.proposed > 0) {
+            if kind < chain::PRIMARY.len() || lengths.iter().any(|length| length.proposed > 0) {
                 counts.acceptance.insert(name, lengths);
             }
         }
