@@ -159,7 +159,7 @@ fn path_space_keeps_the_distribution_under_water() {
 /// Vertices that are nearly mirrors, or nearly clear, move with their chains.
 #[test]
 fn path_space_keeps_the_distribution_among_glossy_surfaces() {
-    keep(&rooms::polished(SIZE), in_path_space(), 50);
+    keep(&rooms::polished(SIZE), in_path_space(), 150);
 }
 
 #[test]
