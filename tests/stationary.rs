@@ -153,7 +153,7 @@ fn path_space_keeps_the_distribution() {
 
 #[test]
 fn path_space_keeps_the_distribution_under_water() {
-    keep(&rooms::water(SIZE), in_path_space(), 50);
+    keep(&rooms::water(SIZE), in_path_space(), 150);
 }
 
 /// Vertices that are nearly mirrors, or nearly clear, move with their chains.

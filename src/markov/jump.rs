@@ -90,13 +90,27 @@ fn invert(
     Some(())
 }
 
-/// Has the state's proposal lead to `path` by the technique that has found it, where the state's is `from`. `None` where it
-/// cannot.
-pub fn retell(scene: &Scene, path: &FullPath, from: usize, state: &mut ChainState, stream: &mut Stream) -> Option<()> {
+/// Has the state's proposal lead to `path` by the technique that has found it, where the state leads to the path `before` by
+/// another, if it leads anywhere. Rows of vertices that are as they were stay. `None` where some row cannot be found.
+pub fn retell(
+    scene: &Scene,
+    path: &FullPath,
+    before: Option<(&FullPath, usize)>,
+    state: &mut ChainState,
+    stream: &mut Stream,
+) -> Option<()> {
     let (tracer, s) = (Tracer { edges: path.edges() }, path.light.vertices.len());
-    forget(path, from, s, state, stream);
+    if let Some((_, from)) = before {
+        forget(path, from, s, state, stream);
+    }
+    let stays = |m: usize, around: &[usize]| {
+        before.is_some_and(|(before, from)| from == s && path.scatters_as(before, m, around))
+    };
     for m in 0..s {
-        state.set(tracer.light_rows() + m, path.light_row(scene, m, stream.row())?);
+        let index = tracer.light_rows() + m;
+        let same = m > 1 && stays(m - 1, &[m - 2, m - 1, m]);
+        let row = if same { state.last(index) } else { path.light_row(scene, m, stream.row())? };
+        state.set(index, row);
     }
     let first = path.camera_row(scene, 1, stream.row())?;
     let [x, y, ..] = stream.row();
@@ -104,7 +118,10 @@ pub fn retell(scene: &Scene, path: &FullPath, from: usize, state: &mut ChainStat
     // The technique that connects with the lens finds the film position by itself.
     state.set(Tracer::CAMERA_ROWS, if seen { first } else { [x, y, first[2], first[3]] });
     for c in 2..tracer.techniques() - s {
-        state.set(Tracer::CAMERA_ROWS + c - 1, path.camera_row(scene, c, stream.row())?);
+        let (index, m) = (Tracer::CAMERA_ROWS + c - 1, tracer.edges + 1 - c);
+        let same = stays(m, &[m - 1, m, m + 1]);
+        let row = if same { state.last(index) } else { path.camera_row(scene, c, stream.row())? };
+        state.set(index, row);
     }
     Some(())
 }

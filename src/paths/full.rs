@@ -81,6 +81,23 @@ impl FullPath {
         m + 1 != s && m != s && self.vertex(m).delta
     }
 
+    /// Whether x_m scatters as in another path: by the same lobe, and with the vertices `around` where they are there.
+    pub fn scatters_as(&self, other: &Self, m: usize, around: &[usize]) -> bool {
+        let same = |m: usize| self.position(m) == other.position(m) && !self.is_at_infinity(m);
+        self.edges() == other.edges()
+            && self.scatters_delta(m) == other.scatters_delta(m)
+            && around.iter().all(|m| same(*m))
+    }
+
+    /// Whether x_m has no position.
+    fn is_at_infinity(&self, m: usize) -> bool {
+        match self.vertex(m).kind {
+            VertexKind::Environment(_) => true,
+            VertexKind::Light(_, start) => matches!(start, Start::Infinite { .. } | Start::Distant { .. }),
+            VertexKind::Surface(_) | VertexKind::Camera => false,
+        }
+    }
+
     /// How x_m scatters, for 0 < m < k.
     pub fn event(&self, scene: &Scene, m: usize) -> Option<Event<'_>> {
         let (to_light, to_camera) = (-self.direction(scene, m - 1)?, self.direction(scene, m)?);

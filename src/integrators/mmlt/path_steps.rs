@@ -6,7 +6,7 @@ use super::lane::{Lane, Work};
 use crate::markov::{ChainState, Tracer, retell};
 use crate::math::Stream;
 use crate::path_space::Proposed;
-use crate::paths::Found;
+use crate::paths::{Found, FullPath};
 use crate::scene::Caster;
 
 /// How far the target may be off, relative to itself, after the way to rows and back.
@@ -34,7 +34,7 @@ impl Lane {
     ) -> Option<Chain> {
         let found = if self.links(scene) {
             let (found, _) = self.draw(scene, tracer, &mut draws)?;
-            self.confirm(scene, tracer, found, found.technique, &mut state, &mut stream).ok()?
+            self.confirm(scene, tracer, found, None, &mut state, &mut stream).ok()?
         } else {
             self.find(scene, tracer, &mut state, &mut draws)?
         };
@@ -69,32 +69,33 @@ impl Lane {
     /// Accepts or rejects what path space proposes, which comes with its acceptance.
     fn move_path(&mut self, chain: &mut Chain, kind: usize, proposal: Option<(Found, f64)>, work: &mut Work<'_>) {
         chain.state.propose(false);
-        let (number, technique) = (chain.stream.number(), chain.current.technique);
+        let number = chain.stream.number();
         // Rows are wanted of what is about to be accepted alone.
         let confirmed = proposal.and_then(|(found, ratio)| {
             if number >= ratio {
                 return Some((found, ratio));
             }
-            let Chain { state, stream, .. } = chain;
-            let confirmed = self.confirm(work.scene, work.tracer, found, technique, state, stream);
+            let Chain { state, stream, path, current, .. } = chain;
+            let before = Some((&*path, current.technique));
+            let confirmed = self.confirm(work.scene, work.tracer, found, before, state, stream);
             Some((confirmed.map_err(|cause| chain.reject(cause)).ok()?, ratio))
         });
         self.decide(chain, kind, confirmed, number, work);
     }
 
-    /// Has the state, whose technique is `from`, lead to the proposal `found`; that must also be what its rows lead to (Otsu
+    /// Has the state, which leads to the path `before`, lead to the proposal `found`; that must also be what its rows lead to (Otsu
     /// 2017, section 6.7.1). Fails with the cause.
     fn confirm(
         &mut self,
         scene: &Caster<'_>,
         tracer: Tracer,
         found: Found,
-        from: usize,
+        before: Option<(&FullPath, usize)>,
         state: &mut ChainState,
         stream: &mut Stream,
     ) -> Result<Found, &'static str> {
         let Self { proposal, returned, health, .. } = self;
-        retell(scene, proposal, from, state, stream).ok_or("inversion")?;
+        retell(scene, proposal, before, state, stream).ok_or("inversion")?;
         let back = tracer.find(scene, found.technique, state, stream, returned, health);
         let same = |back: &Found| (back.luminance / found.luminance - 1.0).abs() < ROUND_TRIP;
         let back = back.filter(same).ok_or("round_trip")?;
