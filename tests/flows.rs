@@ -10,7 +10,7 @@ use common::rooms;
 use pathblend::film::{Health, PathClass};
 use pathblend::markov::Tracer;
 use pathblend::math::Stream;
-use pathblend::path_space::{Gain, Kind, Lengths, PathMutations, PathSpace, Proposed, Target, Weights};
+use pathblend::path_space::{Gain, Kind, Lengths, PathMutations, PathSpace, Proposed, Radii, Target, Weights};
 use pathblend::paths::{Found, FullPath, Techniques, connect_visible};
 use pathblend::scene::{Caster, Scene};
 use rayon::prelude::*;
@@ -18,6 +18,8 @@ use std::collections::BTreeMap;
 
 const SIZE: usize = 8;
 const LENGTHS: Lengths = Lengths { least: 3, most: 5 };
+/// Wide perturbations, in which densities change much.
+const WIDE: Radii = Radii { least: 0.01, most: 0.5 };
 /// Paths in each of some batches.
 const PATHS: u64 = 8000;
 const BATCHES: u64 = 100;
@@ -155,7 +157,7 @@ fn flows(scene: &Scene, target: Target, lengths: Lengths, batch: u64) -> Vec<Flo
     let [mut path, mut proposal] = [FullPath::default(), FullPath::default()];
     let mut stream = Stream::new(9, &[batch, lengths.least as u64]);
     let space = |(_, kinds, weights): (String, Vec<Kind>, Weights)| {
-        let mutations = PathMutations { kinds: kinds.into(), ..PathMutations::default() };
+        let mutations = PathMutations { kinds: kinds.into(), angles: WIDE, ..PathMutations::default() };
         let mut space = PathSpace::new(mutations, target);
         space.weights = weights;
         (space, Flows::default())
