@@ -1,12 +1,13 @@
-//! Mutations in path space, and independent paths as proposals, are in detailed balance: as much goes from here to there as comes back. Independent paths, each
-//! worth what a chain's target has of it, make one mutation each; what flows between classes and techniques has to cancel,
-//! and so has what mutations change of paths of a class: where they are, and how much they contribute.
+//! Mutations in path space, and independent paths as proposals, are in detailed balance: as much goes from here to there as
+//! comes back. Independent paths, each worth what a chain's target has of it, make one mutation each; what flows between
+//! classes and techniques has to cancel, and so has what mutations change of paths of a class: where they are, and how much
+//! they contribute.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod common;
 
-use common::rooms;
+use common::{SIGMAS, rooms};
 use pathblend::film::{Health, PathClass};
 use pathblend::markov::Tracer;
 use pathblend::math::Stream;
@@ -20,11 +21,8 @@ const SIZE: usize = 8;
 const LENGTHS: Lengths = Lengths { least: 3, most: 5 };
 /// Wide perturbations, in which densities change much.
 const WIDE: Radii = Radii { least: 0.01, most: 0.5 };
-/// Paths in each of some batches.
-const PATHS: u64 = 8000;
+/// Paths come in so many batches.
 const BATCHES: u64 = 100;
-/// Standard errors beyond which a sum does not cancel: of some twenty thousand sums one is beyond them in 20 000 runs.
-const SIGMAS: f64 = 6.0;
 /// What fewer paths make is left alone: each way, since a flow of many paths that are worth little may come back as one that
 /// is worth much.
 const FEWEST: u64 = 30;
@@ -110,20 +108,22 @@ impl Flows {
     }
 }
 
-/// Where a path is, on the film, on the light and next to it, how long its edges are and how it bends, and the
-/// logarithm of its `contribution`.
-fn quantities(path: &FullPath, contribution: f64) -> [f64; 10] {
+/// Where a path is, on the film, on the light and next to it; how steep its edges next to the ends are and how it bends
+/// there, how long all edges are, and the logarithm of its `contribution`.
+fn quantities(path: &FullPath, contribution: f64) -> [f64; 13] {
     let edges = path.edges();
     let edge = |m: usize| path.position(m + 1) - path.position(m);
-    let bend = |m: usize| edge(m - 1).normalize_or_zero().dot(edge(m).normalize_or_zero());
+    let direction = |m: usize| edge(m).normalize_or_zero();
     let [light, first] = [0, 1].map(|m| path.position(m));
     let film = path.film / SIZE as f64;
-    let (long, bends) = ((0..edges).map(|m| edge(m).length().ln()).sum(), (1..edges).map(bend).sum());
     let aside = (film - 0.5).length_squared();
-    [film.x, film.y, aside, light.x, light.z, first.x, first.y, long, bends, contribution]
+    let [rise, fall] = [0, edges - 1].map(|m| direction(m).y.abs());
+    let [bend, turn] = [1, edges - 1].map(|m| direction(m - 1).dot(direction(m)));
+    let long = (0..edges).map(|m| edge(m).length().ln()).sum();
+    [film.x, film.y, aside, light.x, light.z, first.x, first.y, rise, fall, bend, turn, long, contribution]
 }
 
-/// Each mutation alone, and each ten times as likely as the others.
+/// Each mutation alone, and two of them ten times as likely as the others.
 fn cases() -> Vec<(String, Vec<Kind>, Weights)> {
     let alone = |kind: Kind| (kind.name().to_owned(), vec![kind], Weights::even(vec![kind].into()));
     let favoured = |kind: Kind| {
@@ -131,7 +131,7 @@ fn cases() -> Vec<(String, Vec<Kind>, Weights)> {
         gains[kind as usize].add(1.0, 0);
         (format!("mostly {}", kind.name()), Kind::ALL.to_vec(), Weights::of(Kind::ALL.to_vec().into(), &gains))
     };
-    Kind::ALL.into_iter().map(alone).chain(Kind::ALL.into_iter().map(favoured)).collect()
+    Kind::ALL.into_iter().map(alone).chain([Kind::Bidirectional, Kind::Manifold].map(favoured)).collect()
 }
 
 /// A path as chains of `target` have it, and what it is worth.
@@ -152,7 +152,7 @@ fn draw(
 }
 
 /// What flows, by case; and by independent paths.
-fn flows(scene: &Scene, target: Target, lengths: Lengths, batch: u64) -> Vec<Flows> {
+fn flows(scene: &Scene, target: Target, lengths: Lengths, (paths, batch): (u64, u64)) -> Vec<Flows> {
     let caster = Caster::new(scene);
     let [mut path, mut proposal] = [FullPath::default(), FullPath::default()];
     let mut stream = Stream::new(9, &[batch, lengths.least as u64]);
@@ -164,7 +164,7 @@ fn flows(scene: &Scene, target: Target, lengths: Lengths, batch: u64) -> Vec<Flo
     };
     let mut spaces: Vec<_> = cases().into_iter().map(space).collect();
     let (sampler, of_independent) = (&mut PathSpace::new(PathMutations::default(), target), &mut Flows::default());
-    for _ in 0..PATHS {
+    for _ in 0..paths {
         let edges = lengths.least + (stream.number() * lengths.count() as f64) as usize;
         let Some((found, worth)) = draw(target, edges, &caster, &mut stream, &mut path) else { continue };
         for (space, flows) in &mut spaces {
@@ -185,11 +185,12 @@ fn flows(scene: &Scene, target: Target, lengths: Lengths, batch: u64) -> Vec<Flo
     of_mutations.chain([std::mem::take(of_independent)]).collect()
 }
 
-fn balance(scene: &Scene) {
+/// Judges `paths` independent paths of each batch.
+fn balance(scene: &Scene, paths: u64) {
     let one = |edges| (Target::Technique, Lengths { least: edges, most: edges });
     let mut failures = Vec::new();
     for (target, lengths) in [(Target::Path(LENGTHS), LENGTHS), one(3), one(4), one(5)] {
-        let batches = (0..BATCHES).into_par_iter().map(|batch| flows(scene, target, lengths, batch));
+        let batches = (0..BATCHES).into_par_iter().map(|batch| flows(scene, target, lengths, (paths, batch)));
         let merge = |a: Vec<Flows>, b: Vec<Flows>| a.into_iter().zip(b).map(|(a, b)| a.merge(b)).collect();
         let names: Vec<String> = cases().into_iter().map(|(name, ..)| name).chain(["independent".to_owned()]).collect();
         let all = batches.reduce(|| vec![Flows::default(); names.len()], merge);
@@ -209,17 +210,17 @@ fn balance(scene: &Scene) {
 
 #[test]
 fn flows_cancel_among_balls() {
-    balance(&rooms::balls(SIZE));
+    balance(&rooms::balls(SIZE), 10_000);
 }
 
 #[test]
 fn flows_cancel_under_water() {
-    balance(&rooms::water(SIZE));
+    balance(&rooms::water(SIZE), 20_000);
 }
 
 #[test]
 fn flows_cancel_among_glossy_surfaces() {
-    balance(&rooms::polished(SIZE));
+    balance(&rooms::polished(SIZE), 20_000);
 }
 
 /// The light of each class and length, by techniques and by independent paths.
@@ -228,7 +229,7 @@ fn light(scene: &Scene, batch: u64) -> BTreeMap<(usize, PathClass), [Sum; 2]> {
     let (mut stream, mut path, mut health) = (Stream::new(7, &[batch]), FullPath::default(), Health::default());
     let mut space = PathSpace::new(PathMutations::default(), Target::Technique);
     let mut light: BTreeMap<_, [Sum; 2]> = BTreeMap::new();
-    for _ in 0..PATHS {
+    for _ in 0..8000 {
         for edges in LENGTHS.least..=LENGTHS.most {
             let tracer = Tracer { edges };
             if let Some(found) = tracer.sample(&caster, &mut stream, &mut path, &mut health) {
