@@ -274,7 +274,7 @@ impl Lane {
         };
         if accepted {
             work.splat(&chain.current, std::mem::replace(&mut chain.weight, acceptance));
-            chain.current = found;
+            (chain.current, chain.drawn) = (found, None);
             chain.state.accept();
             std::mem::swap(&mut chain.path, &mut self.proposal);
         } else {

@@ -60,8 +60,9 @@ impl Lane {
         let drawn = self.draw(work.scene, work.tracer, &mut chain.stream);
         work.large_steps.add(drawn.map_or(0.0, |(_, worth)| worth));
         let proposal = drawn.and_then(|(found, worth)| {
-            let before = self.path_space.worth(work.scene, (&chain.path, &chain.current))?;
-            Some((found, worth / before))
+            let ask = || self.path_space.worth(work.scene, (&chain.path, &chain.current));
+            chain.drawn = chain.drawn.or_else(ask);
+            Some((found, worth / chain.drawn?))
         });
         self.move_path(chain, LARGE, proposal, work);
     }
