@@ -151,6 +151,20 @@ fn draw(
     Some((Found { value: alone.value, luminance: alone.value.luminance(), ..found }, worth))
 }
 
+/// An independent path, with what it is worth.
+fn independent(
+    space: &mut PathSpace,
+    scene: &Caster<'_>,
+    edges: usize,
+    stream: &mut Stream,
+    path: &mut FullPath,
+) -> Option<(Found, f64)> {
+    let tracer = Tracer { edges };
+    let by_technique =
+        |stream: &mut Stream, path: &mut FullPath| tracer.sample(scene, stream, path, &mut Health::default());
+    space.sample(scene, edges, stream, path, by_technique)
+}
+
 /// What flows, by case; and by independent paths.
 fn flows(scene: &Scene, target: Target, lengths: Lengths, (paths, batch): (u64, u64)) -> Vec<Flows> {
     let caster = Caster::new(scene);
@@ -174,8 +188,7 @@ fn flows(scene: &Scene, target: Target, lengths: Lengths, (paths, batch): (u64, 
             }
         }
         let edges = lengths.least + (stream.number() * lengths.count() as f64) as usize;
-        let (tracer, health) = (Tracer { edges }, &mut Health::default());
-        if let Some((next, to)) = sampler.sample(&caster, tracer, &mut stream, &mut proposal, health)
+        if let Some((next, to)) = independent(sampler, &caster, edges, &mut stream, &mut proposal)
             && let Some(from) = sampler.worth(&caster, (&path, &found))
         {
             of_independent.add(target, worth * (to / from).min(1.0), [(&found, &path), (&next, &proposal)]);
@@ -235,7 +248,7 @@ fn light(scene: &Scene, batch: u64) -> BTreeMap<(usize, PathClass), [Sum; 2]> {
             if let Some(found) = tracer.sample(&caster, &mut stream, &mut path, &mut health) {
                 light.entry((edges, found.class)).or_default()[0].add(found.luminance);
             }
-            if let Some((found, worth)) = space.sample(&caster, tracer, &mut stream, &mut path, &mut health) {
+            if let Some((found, worth)) = independent(&mut space, &caster, edges, &mut stream, &mut path) {
                 light.entry((edges, found.class)).or_default()[1].add(worth);
             }
         }

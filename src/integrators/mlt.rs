@@ -148,7 +148,8 @@ impl Lane {
         let count = lengths.count() as f64;
         let tracer = Tracer { edges: lengths.least + (stream.number() * count) as usize };
         let Self { mutations, proposal, health, .. } = self;
-        let (found, worth) = mutations.sample(scene, tracer, stream, proposal, health)?;
+        let by_technique = |stream: &mut Stream, path: &mut FullPath| tracer.sample(scene, stream, path, health);
+        let (found, worth) = mutations.sample(scene, tracer.edges, stream, proposal, by_technique)?;
         Some((found, worth * count))
     }
 

@@ -11,8 +11,6 @@
 //! independent path is the ratio of both paths' worth, where the technique is then drawn by the weights w_s, as jumps do.
 
 use super::{Kind, PathMutations, PathSpace, View, connection, realise};
-use crate::film::Health;
-use crate::markov::Tracer;
 use crate::math::Stream;
 use crate::paths::{Course, Found, FullPath, Random, Techniques, trace_camera};
 use crate::scene::Caster;
@@ -33,22 +31,22 @@ impl PathMutations {
 }
 
 impl PathSpace {
-    /// Draws a path of the tracer's length, left in `path`, with what it is worth: the luminance of f/q. `None` where it
-    /// carries no light.
+    /// Draws a path of `edges` edges, left in `path`, with what it is worth: the luminance of f/q. `None` where it carries no
+    /// light. `by_technique` draws one of any technique, all as likely.
     pub fn sample(
         &mut self,
         scene: &Caster<'_>,
-        tracer: Tracer,
+        edges: usize,
         stream: &mut Stream,
         path: &mut FullPath,
-        health: &mut Health,
+        by_technique: impl FnOnce(&mut Stream, &mut FullPath) -> Option<Found>,
     ) -> Option<(Found, f64)> {
-        let linked = self.mutations.linked(scene, tracer.edges);
+        let linked = self.mutations.linked(scene, edges);
         let technique = if linked > 0.0 && stream.number() < linked {
-            self.link(scene, tracer.edges, stream, path)?;
+            self.link(scene, edges, stream, path)?;
             0
         } else {
-            let found = tracer.sample(scene, stream, path, health)?;
+            let found = by_technique(stream, path)?;
             self.new.follow(path).then_some(found.technique)?
         };
         let alone = realise(scene, &mut self.new, technique, (&Techniques::ALONE, 1.0), path)?;

@@ -20,7 +20,9 @@ impl Lane {
 
     /// An independent path, with what it is worth.
     pub(super) fn draw(&mut self, scene: &Caster<'_>, tracer: Tracer, stream: &mut Stream) -> Option<(Found, f64)> {
-        self.path_space.sample(scene, tracer, stream, &mut self.proposal, &mut self.health)
+        let Self { path_space, proposal, health, .. } = self;
+        let by_technique = |stream: &mut Stream, path: &mut FullPath| tracer.sample(scene, stream, path, health);
+        path_space.sample(scene, tracer.edges, stream, proposal, by_technique)
     }
 
     /// A chain that begins at the independent path that `draws` gives; `None` where its rows cannot be found.
