@@ -16,7 +16,7 @@ use crate::paths::{Course, Found, FullPath, Random, Techniques, trace_camera};
 use crate::scene::Caster;
 
 /// λ: the share of paths that are linked with a light over a manifold, where there are smooth boundaries at all.
-const LINKED: f64 = 0.1;
+const LINKED: f64 = 0.25;
 
 impl PathMutations {
     /// λ for paths of this length.
