@@ -4,7 +4,7 @@ and by photons; below, where that light is too dark (blue) and too bright (orang
 
     cargo build --release && python3 docs/make_sds.py
 
-Needs Pillow. Takes some ten minutes.
+Needs Pillow. Takes five minutes.
 """
 import pathlib
 import subprocess
@@ -15,7 +15,7 @@ from PIL import Image, ImageDraw
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PROGRAM = ROOT / "target/release/pathblend"
 SCENES = ["torus", "pool", "spheres"]
-METHODS = {"rjmlt": "20s", "mlt": "20s", "fused": "20s", "sppm": "120s"}
+METHODS = {"rjmlt": "15s", "mlt": "15s", "fused": "15s", "sppm": "60s"}
 SIZE, LABEL = 128, 16
 
 sheet = Image.new("RGB", (len(METHODS) * (SIZE + 4) - 4, len(SCENES) * (2 * SIZE + LABEL + 8)), "white")

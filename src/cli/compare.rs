@@ -1,7 +1,7 @@
 //! `pathblend compare`.
 
 use super::say;
-use crate::image::{Image, ImageError, is_in_classes, metrics, write_false_colour};
+use crate::image::{Image, is_in_classes, metrics, write_false_colour};
 use anyhow::Context;
 use clap::Args;
 use std::path::PathBuf;
@@ -25,14 +25,8 @@ pub(super) struct Compare {
 
 impl Compare {
     pub(super) fn run(self) -> anyhow::Result<()> {
-        let [image, reference] = [&self.image, &self.reference].map(|file| {
-            let image = Image::read(file)?;
-            Ok::<_, ImageError>(match &self.classes {
-                Some(classes) => image.of_classes(classes),
-                None => image,
-            })
-        });
-        let (image, reference) = (image?, reference?);
+        let image = Image::read(&self.image)?.of_classes(self.classes.as_deref());
+        let reference = Image::read(&self.reference)?.of_classes(self.classes.as_deref());
         let found = metrics::compare(&image, &reference)
             .with_context(|| format!("cannot compare {} with {}", self.image.display(), self.reference.display()))?;
         if let Some(map) = &self.map {

@@ -103,8 +103,9 @@ impl Image {
     }
 
     /// The luminance of the path classes that have `classes` in their name, where letters that repeat count once, as a grey
-    /// picture: `SDS` is in `LSDSE` and in `LSSDDSE`.
-    pub fn of_classes(self, classes: &str) -> Self {
+    /// picture: `SDS` is in `LSDSE` and in `LSSDDSE`. The image as it is, if nothing is said.
+    pub fn of_classes(self, classes: Option<&str>) -> Self {
+        let Some(classes) = classes else { return self };
         let mut colour = Array3::zeros(self.colour.dim());
         for (name, layer) in &self.layers {
             if let (Some(class), Layer::Luminance(light)) = (name.strip_prefix("path_"), layer)
@@ -198,7 +199,7 @@ mod tests {
         for (name, light) in [("path_LSDSE", 1.0), ("path_LSSDDSE", 2.0), ("path_LDSE", 4.0), ("albedo", 8.0)] {
             image.insert(name, Layer::Luminance(Array2::from_elem((2, 3), light))).unwrap();
         }
-        let colour = |classes| image.clone().of_classes(classes).colour;
+        let colour = |classes| image.clone().of_classes(Some(classes)).colour;
         assert_eq!(colour("SDS"), Array3::from_elem((2, 3, 3), 3.0));
         assert_eq!(colour("DSE"), Array3::from_elem((2, 3, 3), 7.0));
         assert_eq!(colour("SE"), colour("DSE"));

@@ -113,7 +113,7 @@ impl ExperimentRecipe {
                     .image
                     .write(&target, &WriteOptions::default())?;
             }
-            let image = judged(Image::read(&target)?, self.classes.as_deref());
+            let image = Image::read(&target)?.of_classes(self.classes.as_deref());
             // Seeds outermost, so that what the machine does meanwhile falls on all variants.
             for seed in 0..self.seeds {
                 for time in &self.times {
@@ -172,7 +172,7 @@ impl Plan<'_> {
             ..Settings::default()
         };
         let outcome = render(scene, variant.integrator, &settings, |_| {});
-        let metrics = compare(&judged(outcome.image, classes), reference)?;
+        let metrics = compare(&outcome.image.of_classes(classes), reference)?;
         let counts = outcome.counts;
         Ok(Run {
             key,
@@ -188,13 +188,5 @@ impl Plan<'_> {
             acceptance: counts.acceptance.into_iter().map(|(kind, lengths)| (kind.to_owned(), lengths)).collect(),
             chains: counts.chains,
         })
-    }
-}
-
-/// What of an image is judged.
-fn judged(image: Image, classes: Option<&str>) -> Image {
-    match classes {
-        Some(classes) => image.of_classes(classes),
-        None => image,
     }
 }
