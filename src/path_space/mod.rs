@@ -28,8 +28,9 @@
 //!
 //! where all weights are one for a chain that has no techniques.
 //!
-//! A mutation is drawn by its weight among those that suit the path, so that T has the sum of their weights, too. Perturbations keep which
-//! vertices scatter by delta lobes and how; both ways have the same choice. Only [`bidirectional`] changes them.
+//! A mutation is drawn by its weight among those that suit the path, so that T has the sum of their weights, too.
+//! Perturbations keep which vertices scatter by delta lobes and how; both ways have the same choice. Only [`bidirectional`]
+//! and [`connection`] change them.
 //!
 //! [`offset_density`]: crate::manifold::offset_density
 //! [`Chain::spread`]: crate::manifold::Chain::spread

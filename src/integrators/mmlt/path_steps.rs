@@ -86,8 +86,8 @@ impl Lane {
         self.decide(chain, kind, confirmed, number, work);
     }
 
-    /// Has the state, which leads to the path `before`, lead to the proposal `found`; that must also be what its rows lead to (Otsu
-    /// 2017, section 6.7.1). Fails with the cause.
+    /// Has the state, which leads to the path `before` if to any, lead to the proposal `found`; that must also be what its rows
+    /// lead to (Otsu 2017, section 6.7.1). Fails with the cause.
     fn confirm(
         &mut self,
         scene: &Caster<'_>,
