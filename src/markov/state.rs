@@ -82,13 +82,14 @@ impl ChainState {
             return slot.row;
         }
         self.changed.push((index, *slot));
-        let row = if self.large || slot.updated < self.last_large || slot.updated == 0 {
+        // Number by number: a copy of the whole waits until each part of it has left the processor's store buffer.
+        let [a, b, c, d] = if self.large || slot.updated < self.last_large || slot.updated == 0 {
             stream.row()
         } else {
             self.small_step.moved_row(slot.row, &self.scales[index], self.step - slot.updated, stream)
         };
-        *slot = Slot { row, updated: self.step };
-        row
+        *slot = Slot { row: [a, b, c, d], updated: self.step };
+        [a, b, c, d]
     }
 
     /// Row `index` as it was last read or set.

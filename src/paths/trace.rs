@@ -154,25 +154,25 @@ fn walk(
             true => scene.see(walker.origin, walker.direction),
             false => scene.intersect(walker.origin, walker.direction),
         };
-        let Some(surface) = found else {
+        let Some(surface) = &found else {
             if let (Walk::FromCamera, Some(id)) = (mode, scene.environment()) {
                 path.vertices.push(environment_vertex(id, &walker));
             }
             return;
         };
-        let vertex = surface_vertex(scene, &surface, &walker, &path.vertices[last]);
         if let VertexKind::Light(id, _) = path.vertices[last].kind {
-            path.vertices[last].preference = scene.preference(id, vertex.position);
+            path.vertices[last].preference = scene.preference(id, surface.position);
         }
-        path.vertices.push(vertex);
+        path.vertices.push(surface_vertex(scene, surface, &walker, &path.vertices[last]));
         if path.vertices.len() == vertices {
             return;
         }
-        let wi = surface.frame.to_local(vertex.back);
-        let row = rows.scattering_row(last + 1 + row_shift, scene, &surface, wi);
-        let Some(scatter) = scene.scatter(&surface, wi, row, mode) else { return };
+        let back = -walker.direction;
+        let wi = surface.frame.to_local(back);
+        let row = rows.scattering_row(last + 1 + row_shift, scene, surface, wi);
+        let Some(scatter) = scene.scatter(surface, wi, row, mode) else { return };
         let direction = surface.frame.to_world(scatter.direction);
-        let mut weight = scatter.weight * shading_correction(&surface, vertex.back, direction, mode);
+        let mut weight = scatter.weight * shading_correction(surface, back, direction, mode);
         // What remains of the walk's power; radiance that was squeezed by refraction is no loss.
         alive *= weight.max_element() * if mode == Walk::FromCamera { scatter.eta * scatter.eta } else { 1.0 };
         if rows.roulette() && last + 1 >= roulette_from {
@@ -186,7 +186,7 @@ fn walk(
         if weight.is_black() {
             return;
         }
-        walker = go_on(path, &surface, &scatter, weight, direction, mode);
+        walker = go_on(path, surface, &scatter, weight, direction, mode);
     }
 }
 
@@ -227,7 +227,7 @@ pub(super) fn environment_vertex(id: EmitterId, walker: &Walker) -> Vertex {
     }
 }
 
-#[inline]
+#[inline(always)]
 pub(super) fn surface_vertex(scene: &Caster<'_>, surface: &Surface, walker: &Walker, previous: &Vertex) -> Vertex {
     let cos = surface.geometric.dot(walker.direction);
     let distance_squared = (surface.position - previous.position).length_squared();

@@ -88,11 +88,17 @@ impl<'a> Caster<'a> {
     /// The closest surface that the camera sees from `origin` along `direction`.
     #[inline]
     pub fn see(&self, origin: Origin, direction: DVec3) -> Option<Surface> {
-        let mut surface = self.intersect(origin, direction)?;
-        while self.scene.hide_emitters && surface.emitter.is_some() {
-            surface = self.intersect(surface.leave(direction), direction)?;
+        let mut met = self.intersect(origin, direction);
+        while let Some(surface) = &met
+            && self.scene.hide_emitters
+            && surface.emitter.is_some()
+        {
+            met = self.intersect(surface.leave(direction), direction);
         }
-        self.scene.camera.reaches(surface.position).then_some(surface)
+        if met.as_ref().is_some_and(|surface| !self.scene.camera.reaches(surface.position)) {
+            met = None;
+        }
+        met
     }
 
     /// Whether the camera sees the point that `from` starts at from its lens at `lens`; `surface` is what it lies on.

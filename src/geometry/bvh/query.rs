@@ -31,7 +31,11 @@ pub struct Query {
     pub tmax: f64,
     /// How far along the ray the origin of the `f32` part lies, in local units.
     pub start: f64,
-    /// Largest absolute coordinate of that origin, for the error bounds.
+    /// That origin.
+    point: DVec3,
+    /// Bound on its rounding, as [`Clipped::slack`].
+    slack: f64,
+    /// Its largest absolute coordinate, for the error bounds.
     pub magnitude: f32,
     /// The shear in `f32`.
     pub shear32: [f32; 3],
@@ -39,8 +43,6 @@ pub struct Query {
     pub origin32: [f32; 3],
     /// The triangle that the ray starts from, which it cannot meet again; [`crate::geometry::NO_TRIANGLE`] for none.
     pub leaving: u32,
-    /// For the box test.
-    pub slabs: Slabs,
 }
 
 impl Query {
@@ -76,7 +78,6 @@ impl Query {
         let (direction, place) = (permute(ray.direction), permute(point));
         let unit = 1.0 / direction[2];
         let shear = [direction[0] * unit, direction[1] * unit, unit];
-        let slabs = Slabs::new(ray.direction, point, slack);
         Some(Self {
             leaving,
             axes,
@@ -85,6 +86,8 @@ impl Query {
             shear,
             tmax,
             start,
+            point,
+            slack,
             magnitude: (point.abs().max_element() + slack) as f32,
             shear32: [shear[0] as f32, shear[1] as f32, shear[2] as f32],
             origin32: [
@@ -92,12 +95,11 @@ impl Query {
                 (place[1] - shear[1] * place[2]) as f32,
                 place[2] as f32,
             ],
-            slabs,
         })
     }
 }
 
-/// The box test's constants, per axis.
+/// The constants of the box test for one ray, per axis.
 pub struct Slabs {
     /// Which of the two planes of a box comes first along the ray: 0 for the lower, 1 for the upper.
     pub near: [usize; 3],
@@ -110,12 +112,13 @@ pub struct Slabs {
 }
 
 impl Slabs {
+    /// `query` is that of `ray`.
     #[inline(always)]
-    fn new(direction: DVec3, origin: DVec3, slack: f64) -> Self {
-        let (d, o) = (direction.as_vec3(), origin.as_vec3());
+    pub fn new(ray: &Ray, query: &Query) -> Self {
+        let (d, o) = (ray.direction.as_vec3(), query.point.as_vec3());
         let inverse = d.abs().max(Vec3::splat(LEAST_DIRECTION)).copysign(d).recip();
         // The tolerance moves near planes nearer and far planes farther, whichever way the ray goes.
-        let pad = (PAD * (o.abs() + slack as f32) + LEAST_PAD).copysign(d);
+        let pad = (PAD * (o.abs() + query.slack as f32) + LEAST_PAD).copysign(d);
         Self {
             // By the sign of the inverse, which a direction of -0 has too.
             near: [

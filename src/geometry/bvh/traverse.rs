@@ -4,7 +4,7 @@ use arrayvec::ArrayVec;
 use wide::f32x8;
 
 use super::packet::Packet;
-use super::query::Query;
+use super::query::{Query, Slabs};
 use super::wide::{Child, ChildKind, Node};
 use super::{Bvh, Form};
 use crate::geometry::{Primitive, Ray};
@@ -88,7 +88,7 @@ impl Bvh {
 
     #[inline(always)]
     fn traverse<const ANY: bool>(&self, nodes: &[Node], packets: &[Packet], query: &Query, ray: &Ray) -> Best {
-        let mut best = Best::new(query);
+        let (mut best, slabs) = (Best::new(query), Slabs::new(ray, query));
         let mut stack = ArrayVec::<u64, STACK>::new_const();
         let mut child = Child::node(0);
         // A prefetch in safe code: reading one word of what waits on the stack brings it into the cache meanwhile.
@@ -102,7 +102,7 @@ impl Bvh {
             match child.kind() {
                 ChildKind::Node(index) => {
                     let node = &nodes[index];
-                    let (mask, enter) = node.enter(query, best.t32);
+                    let (mask, enter) = node.enter(&slabs, best.t32);
                     if let Some(nearest) = nearest(&mut stack, mask, &enter, &node.children, &mut touch) {
                         child = nearest;
                         continue;

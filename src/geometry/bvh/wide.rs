@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use wide::f32x8;
 
-use super::query::Query;
+use super::query::Slabs;
 
 /// What a node's child is: a kind in the upper two bits, an index in the rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
@@ -76,13 +76,12 @@ impl Node {
 
     /// The lanes whose box the ray meets before `limit` (bit mask) and where it enters them.
     ///
-    /// Conservative: the planes are exact; the origin's rounding is in the query's tolerance; the rounding of each
+    /// Conservative: the planes are exact; the origin's rounding is in the tolerance of `slabs`; the rounding of each
     /// distance is below 3 · 2^-24 relative (inverse direction twice rounded, one fused multiply-add), and the final
     /// comparison allows for it on both sides.
     #[inline(always)]
-    pub fn enter(&self, query: &Query, limit: f32) -> (u32, f32x8) {
+    pub fn enter(&self, slabs: &Slabs, limit: f32) -> (u32, f32x8) {
         const SLACK: f32 = 1.0 + 1.0 / (1u32 << 20) as f32;
-        let slabs = &query.slabs;
         let (x, y, z) = (slabs.inverse.x, slabs.inverse.y, slabs.inverse.z);
         let inverse = [f32x8::splat(x), f32x8::splat(y), f32x8::splat(z)];
         let (near_origin, far_origin) = (slabs.near_origin.to_array(), slabs.far_origin.to_array());
