@@ -184,8 +184,8 @@ fn join<const VISIBLE: bool>(
         Some(towards) => (towards, 1.0),
         None => (offset.normalize(), offset.length_squared()),
     };
-    let camera_end = end_of(scene, camera, to_light, Walk::FromCamera)?;
-    let light_end = end_of(scene, light, -to_light, Walk::FromLight)?;
+    let Some(camera_end) = &end_of(scene, camera, to_light, Walk::FromCamera) else { return None };
+    let Some(light_end) = &end_of(scene, light, -to_light, Walk::FromLight) else { return None };
     let value = start.throughput * light_end.value * camera_end.value * end.throughput / distance_squared;
     if value.is_black() {
         return None;

@@ -24,4 +24,4 @@ pub use merge::merge;
 pub use mis::{Heuristic, Junction, Techniques};
 pub use rows::{Open, Random, Rows, Use, uses};
 pub use subpath::{Subpath, Vertex, VertexKind};
-pub use trace::{light_vertex, light_vertex_for, shading_correction, trace_camera, trace_light};
+pub use trace::{light_vertex_for, shading_correction, trace_camera, trace_light};

@@ -41,15 +41,15 @@ pub fn trace_light(
     if vertices == 0 {
         return;
     }
-    let Some(vertex) = light_vertex(scene, rows.row(0)) else { return };
-    path.vertices.push(vertex);
-    let VertexKind::Light(id, start) = vertex.kind else { return };
+    let Some((id, start, pdf)) = &scene.sample_start(rows.row(0)) else { return };
+    path.vertices.push(on_light(*id, *start, *pdf));
     if vertices == 1 {
         return;
     }
-    let Some((origin, direction, weight)) = scene.emitter(id).emit(&start, rows.row(1)) else { return };
-    let normal = if let Start::Surface { normal, .. } = start { normal } else { DVec3::ZERO };
-    let walker = Walker::start((origin + normal * light_offset(origin)).into(), direction, weight * vertex.throughput);
+    let Some((origin, direction, weight)) = scene.emitter(*id).emit(start, rows.row(1)) else { return };
+    let normal = if let Start::Surface { normal, .. } = start { *normal } else { DVec3::ZERO };
+    let throughput = weight * path.vertices[0].throughput;
+    let walker = Walker::start((origin + normal * light_offset(origin)).into(), direction, throughput);
     walk(scene, walker, Walk::FromLight, rows, vertices, roulette_from, path);
 }
 
@@ -60,13 +60,6 @@ pub fn light_vertex_for(scene: &Caster<'_>, point: DVec3, row: Row) -> Option<Ve
     let vertex = on_light(id, start, pdf);
     // Densities are those of walks: weights account for the choice.
     Some(Vertex { forward: AreaPdf(pdf.0 / preference), preference, ..vertex })
-}
-
-/// The first vertex of a walk from a light.
-#[inline]
-pub fn light_vertex(scene: &Caster<'_>, row: Row) -> Option<Vertex> {
-    let (id, start, pdf) = scene.sample_start(row)?;
-    Some(on_light(id, start, pdf))
 }
 
 /// The vertex where light starts, found with density `pdf`.
@@ -170,7 +163,7 @@ fn walk(
         let back = -walker.direction;
         let wi = surface.frame.to_local(back);
         let row = rows.scattering_row(last + 1 + row_shift, scene, surface, wi);
-        let Some(scatter) = scene.scatter(surface, wi, row, mode) else { return };
+        let Some(scatter) = &scene.scatter(surface, wi, row, mode) else { return };
         let direction = surface.frame.to_world(scatter.direction);
         let mut weight = scatter.weight * shading_correction(surface, back, direction, mode);
         // What remains of the walk's power; radiance that was squeezed by refraction is no loss.
@@ -186,7 +179,7 @@ fn walk(
         if weight.is_black() {
             return;
         }
-        walker = go_on(path, surface, &scatter, weight, direction, mode);
+        walker = go_on(path, surface, scatter, weight, direction, mode);
     }
 }
 

@@ -198,12 +198,11 @@ impl Lane {
 
     fn large_step(&mut self, chain: &mut Chain, work: &mut Work<'_>) {
         chain.state.propose(true);
-        let proposal = self.find(work.scene, work.tracer, &mut chain.state, &mut chain.stream);
-        let luminance = proposal.map_or(0.0, |found| found.luminance);
+        let found = &self.find(work.scene, work.tracer, &mut chain.state, &mut chain.stream);
+        let luminance = found.as_ref().map_or(0.0, |found| found.luminance);
         work.large_steps.add(luminance);
-        let proposal = proposal.map(|found| (found, luminance / chain.current.luminance));
-        let number = chain.stream.number();
-        self.decide(chain, LARGE, proposal, number, work);
+        let (ratio, number) = (luminance / chain.current.luminance, chain.stream.number());
+        self.decide(chain, LARGE, (found, ratio), number, work);
     }
 
     fn small_step(&mut self, chain: &mut Chain, work: &mut Work<'_>) {
@@ -212,20 +211,19 @@ impl Lane {
         let Work { scene, tracer, .. } = *work;
         let Self { proposal, health, controlled, family, .. } = self;
         let before = current.technique;
-        let (technique, found) = if self.mutations.controlled {
-            let found = controlled_step(tracer, scene, (path, current), state, stream, proposal, health, controlled);
-            (before, found)
+        let (technique, found, correction) = if self.mutations.controlled {
+            let moved = controlled_step(tracer, scene, (path, current), state, stream, proposal, health, controlled);
+            (before, moved.map(|(found, _)| found), moved.map_or(0.0, |(_, correction)| correction))
         } else {
             let technique = match family {
                 Family::Multiplexed => tracer.technique(state.row(Tracer::TECHNIQUE_ROW, stream)[0]),
                 Family::Jumping | Family::Fused => before,
             };
-            let found = tracer.find(scene, technique, state, stream, proposal, health);
-            (technique, found.map(|found| (found, 1.0)))
+            (technique, tracer.find(scene, technique, state, stream, proposal, health), 1.0)
         };
-        let ratio = |(found, correction): (Found, f64)| (found, correction * found.luminance / current.luminance);
-        let (proposal, number) = (found.map(ratio), stream.number());
-        let accepted = self.decide(chain, SMALL, proposal, number, work);
+        let ratio = found.as_ref().map_or(0.0, |found| correction * found.luminance / current.luminance);
+        let number = stream.number();
+        let accepted = self.decide(chain, SMALL, (&found, ratio), number, work);
         if technique != before {
             chain.tally(CHANGE, accepted);
         }
@@ -246,20 +244,20 @@ impl Lane {
             state.set(Tracer::TECHNIQUE_ROW, [number, 0.0, 0.0, 0.0]);
         }
         let number = chain.stream.number();
-        self.decide(chain, LARGE, proposal.map(|found| (found, sum / before)), number, work);
+        self.decide(chain, LARGE, (&proposal, sum / before), number, work);
     }
 
-    /// Accepts the proposal, which comes with its acceptance, if `number` is less than that; says whether.
+    /// Accepts the proposal, which comes with its acceptance (0 for none), if `number` is less than that; says whether.
     #[inline]
     pub(super) fn decide(
         &mut self,
         chain: &mut Chain,
         kind: usize,
-        proposal: Option<(Found, f64)>,
+        (proposal, ratio): (&Option<Found>, f64),
         number: f64,
         work: &mut Work<'_>,
     ) -> bool {
-        let acceptance = proposal.map_or(0.0, |(_, ratio)| ratio.min(1.0));
+        let acceptance = ratio.min(1.0);
         chain.weight += 1.0 - acceptance;
         if let Some(pilot) = &mut self.pilot {
             let rays = work.scene.rays();
@@ -268,17 +266,17 @@ impl Lane {
         }
         let accepted = number < acceptance;
         chain.tally(kind, accepted);
-        let Some((found, _)) = proposal else {
+        let Some(found) = proposal else {
             chain.state.reject();
             return false;
         };
         if accepted {
             work.splat(&chain.current, std::mem::replace(&mut chain.weight, acceptance));
-            (chain.current, chain.drawn) = (found, None);
+            (chain.current, chain.drawn) = (*found, None);
             chain.state.accept();
             std::mem::swap(&mut chain.path, &mut self.proposal);
         } else {
-            work.splat(&found, acceptance);
+            work.splat(found, acceptance);
             chain.state.reject();
         }
         accepted

@@ -83,7 +83,8 @@ impl Lane {
             let confirmed = self.confirm(work.scene, work.tracer, found, before, state, stream);
             Some((confirmed.map_err(|cause| chain.reject(cause)).ok()?, ratio))
         });
-        self.decide(chain, kind, confirmed, number, work);
+        let ratio = confirmed.map_or(0.0, |(_, ratio)| ratio);
+        self.decide(chain, kind, (&confirmed.map(|(found, _)| found), ratio), number, work);
     }
 
     /// Has the state, which leads to the path `before` if to any, lead to the proposal `found`; that must also be what its rows
