@@ -11,7 +11,9 @@ use common::{SIGMAS, rooms};
 use pathblend::film::{Health, PathClass};
 use pathblend::markov::Tracer;
 use pathblend::math::Stream;
-use pathblend::path_space::{Gain, Kind, Lengths, PathMutations, PathSpace, Proposed, Radii, Target, Weights};
+use pathblend::path_space::{
+    Drawn, Gain, Kind, Lengths, PathMutations, PathSpace, Proposed, Radii, Target, Ways, Weights,
+};
 use pathblend::paths::{Found, FullPath, Techniques, connect_visible};
 use pathblend::scene::{Caster, Scene};
 use rayon::prelude::*;
@@ -151,18 +153,21 @@ fn draw(
     Some((Found { value: alone.value, luminance: alone.value.luminance(), ..found }, worth))
 }
 
-/// An independent path, with what it is worth.
+/// The ways in which independent paths come about.
+const WAYS: [Ways; 2] = [Ways::Known, Ways::All];
+
+/// An independent path.
 fn independent(
     space: &mut PathSpace,
     scene: &Caster<'_>,
-    edges: usize,
+    (edges, ways): (usize, Ways),
     stream: &mut Stream,
     path: &mut FullPath,
-) -> Option<(Found, f64)> {
+) -> Option<Drawn> {
     let tracer = Tracer { edges };
     let by_technique =
         |stream: &mut Stream, path: &mut FullPath| tracer.sample(scene, stream, path, &mut Health::default());
-    space.sample(scene, edges, stream, path, by_technique)
+    space.sample(scene, (edges, ways), stream, path, by_technique)
 }
 
 /// What flows, by case; and by independent paths.
@@ -177,7 +182,8 @@ fn flows(scene: &Scene, target: Target, lengths: Lengths, (paths, batch): (u64, 
         (space, Flows::default())
     };
     let mut spaces: Vec<_> = cases().into_iter().map(space).collect();
-    let (sampler, of_independent) = (&mut PathSpace::new(PathMutations::default(), target), &mut Flows::default());
+    let sampler = &mut PathSpace::new(PathMutations::default(), target);
+    let mut of_independent = WAYS.map(|_| Flows::default());
     for _ in 0..paths {
         let edges = lengths.least + (stream.number() * lengths.count() as f64) as usize;
         let Some((found, worth)) = draw(target, edges, &caster, &mut stream, &mut path) else { continue };
@@ -187,15 +193,18 @@ fn flows(scene: &Scene, target: Target, lengths: Lengths, (paths, batch): (u64, 
                 flows.add(target, worth * ratio.min(1.0), [(&found, &path), (&next, &proposal)]);
             }
         }
-        let edges = lengths.least + (stream.number() * lengths.count() as f64) as usize;
-        if let Some((next, to)) = independent(sampler, &caster, edges, &mut stream, &mut proposal)
-            && let Some(from) = sampler.worth(&caster, (&path, &found))
-        {
-            of_independent.add(target, worth * (to / from).min(1.0), [(&found, &path), (&next, &proposal)]);
+        for (ways, flows) in WAYS.into_iter().zip(&mut of_independent) {
+            let edges = lengths.least + (stream.number() * lengths.count() as f64) as usize;
+            if let Some(next) = independent(sampler, &caster, (edges, ways), &mut stream, &mut proposal)
+                && let Some(from) = sampler.worth(&caster, (&path, &found), ways, &mut stream)
+            {
+                let acceptance = (next.worth / from).min(1.0);
+                flows.add(target, worth * acceptance, [(&found, &path), (&next.found, &proposal)]);
+            }
         }
     }
     let of_mutations = spaces.into_iter().map(|(_, flows)| flows);
-    of_mutations.chain([std::mem::take(of_independent)]).collect()
+    of_mutations.chain(of_independent).collect()
 }
 
 /// Judges `paths` independent paths of each batch.
@@ -205,7 +214,8 @@ fn balance(scene: &Scene, paths: u64) {
     for (target, lengths) in [(Target::Path(LENGTHS), LENGTHS), one(3), one(4), one(5)] {
         let batches = (0..BATCHES).into_par_iter().map(|batch| flows(scene, target, lengths, (paths, batch)));
         let merge = |a: Vec<Flows>, b: Vec<Flows>| a.into_iter().zip(b).map(|(a, b)| a.merge(b)).collect();
-        let names: Vec<String> = cases().into_iter().map(|(name, ..)| name).chain(["independent".to_owned()]).collect();
+        let of_independent = WAYS.map(|ways| format!("independent, {ways:?}"));
+        let names: Vec<String> = cases().into_iter().map(|(name, ..)| name).chain(of_independent).collect();
         let all = batches.reduce(|| vec![Flows::default(); names.len()], merge);
         for (name, Flows { between, drifts }) in names.into_iter().zip(&all) {
             let flows = between.iter().map(|(cells, sum)| (format!("{cells:?}"), sum));
@@ -236,20 +246,23 @@ fn flows_cancel_among_glossy_surfaces() {
     balance(&rooms::polished(SIZE), 20_000);
 }
 
+/// Paths of each length in a batch that tell the light of classes.
+const PATHS: u64 = 8000;
+
 /// The light of each class and length, by techniques and by independent paths.
 fn light(scene: &Scene, batch: u64) -> BTreeMap<(usize, PathClass), [Sum; 2]> {
     let caster = Caster::new(scene);
     let (mut stream, mut path, mut health) = (Stream::new(7, &[batch]), FullPath::default(), Health::default());
     let mut space = PathSpace::new(PathMutations::default(), Target::Technique);
     let mut light: BTreeMap<_, [Sum; 2]> = BTreeMap::new();
-    for _ in 0..8000 {
+    for _ in 0..PATHS {
         for edges in LENGTHS.least..=LENGTHS.most {
             let tracer = Tracer { edges };
             if let Some(found) = tracer.sample(&caster, &mut stream, &mut path, &mut health) {
                 light.entry((edges, found.class)).or_default()[0].add(found.luminance);
             }
-            if let Some((found, worth)) = independent(&mut space, &caster, edges, &mut stream, &mut path) {
-                light.entry((edges, found.class)).or_default()[1].add(worth);
+            if let Some(drawn) = independent(&mut space, &caster, (edges, Ways::All), &mut stream, &mut path) {
+                light.entry((edges, drawn.found.class)).or_default()[1].add(drawn.worth);
             }
         }
     }

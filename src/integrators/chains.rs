@@ -1,6 +1,7 @@
 //! What methods with chains share.
 
 use crate::math::{Discrete, Stream};
+use crate::path_space::Ways;
 use crate::scene::{Caster, Scene};
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
@@ -58,6 +59,38 @@ impl Mean {
     }
 }
 
+/// Independent samples of a target, of which hidden paths are judged by themselves: draws that do not seek them find them
+/// so seldom that a mean over these would be told by single samples.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Light {
+    open: Mean,
+    hidden: Mean,
+}
+
+impl Light {
+    /// A sample that has been drawn in these ways: what it is worth, and whether its light is hidden.
+    pub(super) fn add(&mut self, (target, hidden): (f64, bool), ways: Ways) {
+        self.open.add(if hidden { 0.0 } else { target });
+        if ways == Ways::All {
+            self.hidden.add(if hidden { target } else { 0.0 });
+        }
+    }
+
+    pub(super) fn merge(&mut self, other: &Self) {
+        self.open.merge(&other.open);
+        self.hidden.merge(&other.hidden);
+    }
+
+    pub(super) fn mean(&self) -> f64 {
+        self.open.mean() + self.hidden.mean()
+    }
+
+    /// Standard error of the mean.
+    pub(super) fn error(&self) -> f64 {
+        self.open.error().hypot(self.hidden.error())
+    }
+}
+
 /// What passes are worth, of a mean that becomes known better from pass to pass: so much that all together have the latest
 /// mean, those before it was known included.
 #[derive(Clone, Copy, Debug, Default)]
@@ -81,14 +114,14 @@ impl Worth {
 
 /// Targets of `samples` independent samples, in parallel. `memory` is what one thread needs, `one` gives the target of a
 /// sample by its number.
-pub(super) fn independent<M>(
+pub(super) fn independent<M, T: Clone + Send>(
     scene: &Scene,
     samples: usize,
     memory: impl Fn() -> M + Sync,
-    one: impl Fn(&Caster<'_>, &mut M, usize) -> f64 + Sync,
-) -> Vec<f64> {
+    one: impl Fn(&Caster<'_>, &mut M, usize) -> T + Sync,
+) -> Vec<T> {
     const CHUNK: usize = 256;
-    let chunks: Vec<Vec<f64>> = (0..samples.div_ceil(CHUNK))
+    let chunks: Vec<Vec<T>> = (0..samples.div_ceil(CHUNK))
         .into_par_iter()
         .map(|chunk| {
             let (caster, mut memory) = (Caster::new(scene), memory());

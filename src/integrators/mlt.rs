@@ -13,7 +13,7 @@ use crate::film::{Film, Health, Kernel, Splats};
 use crate::manifold::Rejection;
 use crate::markov::Tracer;
 use crate::math::Stream;
-use crate::path_space::{Kind, Lengths, PathMutations, PathSpace, Proposed, Target};
+use crate::path_space::{Drawn, Kind, Lengths, PathMutations, PathSpace, Proposed, Target, Ways};
 use crate::paths::{Found, FullPath};
 use crate::scene::{Caster, Scene};
 use rayon::prelude::*;
@@ -86,7 +86,7 @@ impl Mlt {
         let stream = |number: usize| Stream::new(seed, &[2, 0, batch, number as u64]);
         let memory = || Lane::new(self.mutations, Target::Path(lengths));
         let targets = independent(scene, samples, memory, |caster, lane, number| {
-            lane.sample(caster, lengths, &mut stream(number)).map_or(0.0, |(_, worth)| worth)
+            lane.sample(caster, lengths, &mut stream(number)).map_or(0.0, |drawn| drawn.worth)
         });
         self.batches += 1;
         targets.iter().for_each(|target| self.mean.add(*target));
@@ -143,19 +143,19 @@ impl Lane {
         Self { chain: None, mutations, proposal: FullPath::default(), health: Health::default() }
     }
 
-    /// An independent path of any of the lengths, all as likely, with what it is worth.
-    fn sample(&mut self, scene: &Caster<'_>, lengths: Lengths, stream: &mut Stream) -> Option<(Found, f64)> {
+    /// An independent path of any of the lengths, all as likely.
+    fn sample(&mut self, scene: &Caster<'_>, lengths: Lengths, stream: &mut Stream) -> Option<Drawn> {
         let count = lengths.count() as f64;
         let tracer = Tracer { edges: lengths.least + (stream.number() * count) as usize };
         let Self { mutations, proposal, health, .. } = self;
         let by_technique = |stream: &mut Stream, path: &mut FullPath| tracer.sample(scene, stream, path, health);
-        let (found, worth) = mutations.sample(scene, tracer.edges, stream, proposal, by_technique)?;
-        Some((found, worth * count))
+        let drawn = mutations.sample(scene, (tracer.edges, Ways::All), stream, proposal, by_technique)?;
+        Some(Drawn { worth: drawn.worth * count, ..drawn })
     }
 
     /// Begins at the sample that `draws` gives.
     fn start(&mut self, scene: &Caster<'_>, lengths: Lengths, draws: &mut Stream, stream: Stream) {
-        let Some((current, _)) = self.sample(scene, lengths, draws) else { return };
+        let Some(Drawn { found: current, .. }) = self.sample(scene, lengths, draws) else { return };
         let (path, tallies, rejections) = (std::mem::take(&mut self.proposal), Default::default(), BTreeMap::new());
         self.chain = Some(Chain { stream, current, path, weight: 0.0, tallies, rejections });
     }

@@ -120,7 +120,9 @@ impl Tracer {
     /// What the two subpaths make together.
     #[inline]
     pub(super) fn connect(self, scene: &Caster<'_>, path: &mut FullPath, health: &mut Health) -> Option<Found> {
-        let Some(found) = &connect(scene, &path.light.vertices, &path.camera.vertices, &TECHNIQUES) else { return None };
+        let Some(found) = &connect(scene, &path.light.vertices, &path.camera.vertices, &TECHNIQUES) else {
+            return None;
+        };
         let value = found.value * self.techniques() as f64;
         let luminance = value.luminance();
         if !(health.accepts(value) && luminance > 0.0) {

@@ -21,9 +21,17 @@ use crate::math::{Frame, Stream, Walk};
 use crate::paths::{Course, FullPath, Node, VertexKind};
 use crate::scene::{Caster, Surface};
 use arrayvec::ArrayVec;
+use glam::DVec3;
 
 /// Two chains are the same if their vertices are no further apart, relative to the distance of their ends.
 const SAME: f64 = 1e-7;
+
+/// Share of the random seeds that take the way that they try as it is.
+const AS_TRIED: f64 = 0.25;
+/// How far others turn from there towards the light's image: as far as can be.
+const SHARES: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
+/// Two sides of things are the same if the cosine between their normals is above this.
+const ALIKE: f64 = 0.9;
 
 /// Whether some vertex could be linked.
 pub(super) fn suits(scene: &Caster<'_>, course: &Course) -> bool {
@@ -57,7 +65,7 @@ pub(super) fn propose(
     }
     let part = Range::new(0, d, edges);
     let technique = if stream.number() < 0.5 {
-        connect(view.scene, old, d, stream, new)?;
+        connect(view.scene, old, d, Seed::Straight, stream, new)?;
         0
     } else {
         resample(view.scene, old, part, d, stream, new).ok_or(Rejection::Dark)?
@@ -68,18 +76,30 @@ pub(super) fn propose(
     Ok(Draft { technique, ratio: 1.0, ranges: Some([part, part]), linked: Some(d) })
 }
 
+/// Where a walk to a light begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Seed {
+    /// The straight way there, bent where it meets boundaries: it depends on nothing but the ends.
+    Straight,
+    /// A way that scatters at random where the link begins, and is reflected or refracted at random at each boundary (Zeltner, Georgiev and Jakob 2020, "Specular Manifold Sampling").
+    Random,
+}
+
 /// Links x_d with a light.
 pub(super) fn connect(
     scene: &Caster<'_>,
     old: &Course,
     d: usize,
+    seed: Seed,
     stream: &mut Stream,
     new: &mut Course,
 ) -> Result<(), Rejection> {
     let (id, start, _) = scene.sample_start(stream.row()).ok_or(Rejection::Unsuitable)?;
     let light = Node::light(id, start);
-    let from = &old.nodes[d];
-    let chain = seeded(scene, from, &light, d - 1)?;
+    let chain = match seed {
+        Seed::Straight => straight(scene, &old.nodes[d], &light, d - 1)?,
+        Seed::Random => random(scene, old, d, &light, stream)?,
+    };
     new.clone_from(old);
     for (link, node) in chain.links().iter().zip(new.nodes[1..d].iter_mut().rev()) {
         *node = Node::on(link.surface, true);
@@ -91,47 +111,142 @@ pub(super) fn connect(
     Ok(())
 }
 
-/// The chain of `count` smooth boundaries from `from` to a point of a light to which the seed walks.
-fn seeded(scene: &Caster<'_>, from: &Node, light: &Node, count: usize) -> Result<Chain, Rejection> {
+/// The chain of `count` smooth boundaries from `from` to a point of a light to which the straight seed walks.
+fn straight(scene: &Caster<'_>, from: &Node, light: &Node, count: usize) -> Result<Chain, Rejection> {
     let VertexKind::Light(_, Start::Surface { .. }) = light.kind else { return Err(Rejection::Unsuitable) };
-    let mut direction = (light.position - from.position).try_normalize().ok_or(Rejection::Singular)?;
-    let Frame { tangent, bitangent, .. } = Frame::around(direction);
-    let goal = Goal::new(light.position, [tangent, bitangent]);
-    let mut origin = from.leave(direction);
-    let mut surfaces: ArrayVec<(Surface, bool), MOST_LINKS> = ArrayVec::new();
-    for _ in 0..count {
-        let surface = scene.intersect(origin, direction).ok_or(Rejection::Unsuitable)?;
-        let met = surface.frame.to_local(-direction);
-        if surface.up.z < 1.0 || !scene.bsdf(surface.bsdf).is_delta(met) {
-            return Err(Rejection::Unsuitable);
-        }
-        let turn = Turn::at(scene, &surface, -direction, direction).ok_or(Rejection::Unsuitable)?;
-        direction = turn.onward(surface.frame.normal, -direction).ok_or(Rejection::Unsuitable)?;
-        surfaces.try_push((surface, true)).map_err(|_| Rejection::TooLong)?;
-        origin = surface.leave(direction);
+    let direction = (light.position - from.position).try_normalize().ok_or(Rejection::Singular)?;
+    let bend = |surface: &Surface, direction: DVec3| {
+        Turn::at(scene, surface, -direction, direction)?.onward(surface.frame.normal, -direction)
+    };
+    Way::trace(scene, from, count, direction, bend)?.settle(scene, from, light)
+}
+
+/// The chain from x_d to a point of a light to which a random seed walks. The way that the seed tries tells which surfaces it
+/// meets, and which of them reflect. Most seeds unfold it: they set out for the light's image in the planes of these, as the
+/// straight one does for the light, or as far towards it as they meet the same sides of things.
+fn random(
+    scene: &Caster<'_>,
+    course: &Course,
+    d: usize,
+    light: &Node,
+    stream: &mut Stream,
+) -> Result<Chain, Rejection> {
+    let VertexKind::Light(_, Start::Surface { .. }) = light.kind else { return Err(Rejection::Unsuitable) };
+    let from = &course.nodes[d];
+    let surface = from.surface().ok_or(Rejection::Unsuitable)?;
+    let back = course.direction(scene, d).ok_or(Rejection::Singular)?;
+    let scatter = scene.scatter(surface, surface.frame.to_local(back), stream.row(), Walk::FromCamera);
+    let scatter = scatter.filter(|scatter| !scatter.delta).ok_or(Rejection::Unsuitable)?;
+    let mut reflected: ArrayVec<bool, MOST_LINKS> = ArrayVec::new();
+    let pass = |surface: &Surface, direction: DVec3| {
+        Turn::at(scene, surface, -direction, direction)?.onward(surface.frame.normal, -direction)
+    };
+    let reflect = |surface: &Surface, direction: DVec3| Turn::Reflected.onward(surface.frame.normal, -direction);
+    let choose = |surface: &Surface, direction: DVec3| {
+        let passed = if stream.number() < 0.5 { pass(surface, direction) } else { None };
+        reflected.try_push(passed.is_none()).ok()?;
+        passed.or_else(|| reflect(surface, direction))
+    };
+    let tried = surface.frame.to_world(scatter.direction);
+    let way = Way::trace(scene, from, d - 1, tried, choose)?;
+    if stream.number() < AS_TRIED {
+        return way.settle(scene, from, light);
     }
-    let (last, _) = surfaces.last().ok_or(Rejection::Unsuitable)?;
-    let end = last.position + direction * last.position.distance(light.position);
-    Ok(Chain::new(scene, from.position, &surfaces, end)?.walk(scene, from, &goal)?.0)
+    let mirrored = way.surfaces.iter().zip(&reflected).rev().filter(|(_, reflected)| **reflected);
+    let image = mirrored.fold(light.position, |image, ((surface, _), _)| {
+        let normal = surface.frame.normal;
+        image - normal * (2.0 * normal.dot(image - surface.position))
+    });
+    let unfolded = (image - from.position).try_normalize().ok_or(Rejection::Singular)?;
+    let follow = |share: f64| {
+        let mut planned = reflected.iter();
+        let bend = |surface: &Surface, direction: DVec3| match planned.next()? {
+            true => reflect(surface, direction),
+            false => pass(surface, direction),
+        };
+        let direction = tried.lerp(unfolded, share).try_normalize()?;
+        Way::trace(scene, from, d - 1, direction, bend).ok().filter(|other| other.is_like(&way))
+    };
+    SHARES.into_iter().find_map(follow).unwrap_or_else(|| way.clone()).settle(scene, from, light)
+}
+
+/// A way through smooth boundaries, which need not lead to a light.
+#[derive(Clone)]
+struct Way {
+    surfaces: ArrayVec<(Surface, bool), MOST_LINKS>,
+    /// Where it leads.
+    direction: DVec3,
+}
+
+impl Way {
+    /// Sets out along `direction` and meets `count` surfaces, at each of which it goes on as `bend` says.
+    fn trace(
+        scene: &Caster<'_>,
+        from: &Node,
+        count: usize,
+        mut direction: DVec3,
+        mut bend: impl FnMut(&Surface, DVec3) -> Option<DVec3>,
+    ) -> Result<Self, Rejection> {
+        let mut origin = from.leave(direction);
+        let mut surfaces = ArrayVec::new();
+        for _ in 0..count {
+            let surface = scene.intersect(origin, direction).ok_or(Rejection::Unsuitable)?;
+            let met = surface.frame.to_local(-direction);
+            if surface.up.z < 1.0 || !scene.bsdf(surface.bsdf).is_delta(met) {
+                return Err(Rejection::Unsuitable);
+            }
+            direction = bend(&surface, direction).ok_or(Rejection::Unsuitable)?;
+            origin = surface.leave(direction);
+            surfaces.try_push((surface, true)).map_err(|_| Rejection::TooLong)?;
+        }
+        Ok(Self { surfaces, direction })
+    }
+
+    /// Whether it passes the same sides of things as another, as far as normals tell.
+    fn is_like(&self, other: &Self) -> bool {
+        let pairs = self.surfaces.iter().zip(&other.surfaces);
+        pairs.into_iter().all(|((a, _), (b, _))| a.frame.normal.dot(b.frame.normal) > ALIKE)
+    }
+
+    /// The chain nearby that leads to a point of a light.
+    fn settle(&self, scene: &Caster<'_>, from: &Node, light: &Node) -> Result<Chain, Rejection> {
+        let Self { surfaces, direction } = self;
+        let (last, _) = surfaces.last().ok_or(Rejection::Unsuitable)?;
+        let Frame { tangent, bitangent, .. } = Frame::around(*direction);
+        let goal = Goal::new(light.position, [tangent, bitangent]);
+        let end = last.position + *direction * last.position.distance(light.position);
+        Ok(Chain::new(scene, from.position, surfaces, end)?.walk(scene, from, &goal)?.0)
+    }
+}
+
+/// Whether `course` has this chain between x_d and the light.
+fn has(course: &Course, d: usize, chain: &Chain) -> bool {
+    let close = SAME * course.nodes[0].position.distance(course.nodes[d].position);
+    let same = |(link, node): (&Surface, &Node)| link.position.distance(node.position) <= close;
+    chain.surfaces().zip(course.nodes[1..d].iter().rev()).all(same)
+}
+
+/// Whether a random seed from x_d finds the chain that `course` has.
+pub(super) fn finds(scene: &Caster<'_>, course: &Course, d: usize, stream: &mut Stream) -> bool {
+    random(scene, course, d, &course.nodes[0], stream).is_ok_and(|chain| has(course, d, &chain))
 }
 
 /// How likely the connection is, relative to the walk from the camera, to make of x_d the light's end that `course` has.
 pub(super) fn share(view: &View<'_>, course: &mut Course, d: usize, memory: &mut FullPath) -> f64 {
-    density(view, course, d, memory).unwrap_or(0.0)
+    let seeded = || {
+        let chain = straight(view.scene, &course.nodes[d], &course.nodes[0], d - 1).ok()?;
+        has(course, d, &chain).then_some(())
+    };
+    let delta = course.nodes[1..d].iter().all(|node| node.delta);
+    if !delta || seeded().is_none() {
+        return 0.0;
+    }
+    reach(view.scene, course, d, memory).unwrap_or(0.0)
 }
 
-fn density(view: &View<'_>, course: &mut Course, d: usize, memory: &mut FullPath) -> Option<f64> {
-    let (scene, light, from) = (view.scene, &course.nodes[0], &course.nodes[d]);
-    if !course.nodes[1..d].iter().all(|node| node.delta) {
-        return None;
-    }
-    let VertexKind::Light(id, start) = light.kind else { return None };
-    let chain = seeded(scene, from, light, d - 1).ok()?;
-    let close = SAME * from.position.distance(light.position);
-    let same = |(link, node): (&Surface, &Node)| link.position.distance(node.position) <= close;
-    if !chain.surfaces().zip(course.nodes[1..d].iter().rev()).all(same) {
-        return None;
-    }
+/// The same for a seed that is sure to find the chain.
+pub(super) fn reach(scene: &Caster<'_>, course: &mut Course, d: usize, memory: &mut FullPath) -> Option<f64> {
+    let VertexKind::Light(id, start) = course.nodes[0].kind else { return None };
     course.light_up(scene)?;
     memory.assemble(scene, course, 0)?;
     let walked: f64 = (0..d).map(|m| memory.camera.vertices[course.edges() - m].forward.0).product();

@@ -56,6 +56,7 @@ pub use bidirectional::Lengths;
 pub use gains::{Gain, Weights, way};
 pub use kinds::{Kind, Kinds, PathMutations};
 pub use steps::Radii;
+pub use whole::{Drawn, Ways};
 
 use judge::realise;
 

@@ -1,6 +1,6 @@
 //! The chains of one lane, and what they do in a pass.
 
-use super::super::chains::Mean;
+use super::super::chains::Light;
 use super::chain::{CHANGE, Chain, KINDS, LARGE, SMALL};
 use super::{Family, Share};
 use crate::film::{Health, Kernel, Splats};
@@ -8,7 +8,7 @@ use crate::markov::{
     ChainState, ControlledMemory, Jump, JumpMemory, Jumps, Mutations, Tracer, Tries, controlled_step, jump,
 };
 use crate::math::Stream;
-use crate::path_space::{Gain, PathSpace, Target, way};
+use crate::path_space::{Gain, PathSpace, Target, Ways, way};
 use crate::paths::{Found, FullPath};
 use crate::scene::{Caster, Scene};
 
@@ -25,7 +25,7 @@ pub(super) struct Job {
     pub splats: Splats,
     pub rays: u64,
     /// Per length what large steps found.
-    pub large_steps: Vec<Mean>,
+    pub large_steps: Vec<Light>,
     pub health: Health,
 }
 
@@ -56,7 +56,7 @@ pub(super) struct Work<'a> {
     /// What one mutation adds.
     worth: f64,
     /// What large steps found.
-    pub large_steps: Mean,
+    pub large_steps: Light,
 }
 
 impl Work<'_> {
@@ -112,7 +112,7 @@ impl Lane {
             let Share { tracer, worth, mutations, weights } = *share;
             self.path_space.weights = weights;
             let (scene, splats) = (&caster, &mut splats);
-            let mut work = Work { scene, tracer, kernel, splats, worth, large_steps: Mean::default() };
+            let mut work = Work { scene, tracer, kernel, splats, worth, large_steps: Light::default() };
             if let Some(chain) = chain {
                 for _ in 0..own(mutations) {
                     self.mutate(chain, &mut work);
@@ -139,7 +139,7 @@ impl Lane {
         let mut chain = Chain { stream, ..chain.clone() };
         let (caster, mut splats) = (Caster::new(scene), Splats::new(size));
         let (scene, splats) = (&caster, &mut splats);
-        let mut work = Work { scene, tracer, kernel, splats, worth: 0.0, large_steps: Mean::default() };
+        let mut work = Work { scene, tracer, kernel, splats, worth: 0.0, large_steps: Light::default() };
         self.pilot = Some(Pilot::default());
         for _ in 0..mutations {
             self.mutate(&mut chain, &mut work);
@@ -200,7 +200,7 @@ impl Lane {
         chain.state.propose(true);
         let found = &self.find(work.scene, work.tracer, &mut chain.state, &mut chain.stream);
         let luminance = found.as_ref().map_or(0.0, |found| found.luminance);
-        work.large_steps.add(luminance);
+        work.large_steps.add((luminance, false), Ways::Known);
         let (ratio, number) = (luminance / chain.current.luminance, chain.stream.number());
         self.decide(chain, LARGE, (found, ratio), number, work);
     }
@@ -237,7 +237,7 @@ impl Lane {
         let before = current.luminance + self.tries.sum(tracer, scene, known, state, stream, &mut self.health);
         state.propose(true);
         let sum = self.tries.sum(tracer, scene, None, state, stream, &mut self.health);
-        work.large_steps.add(sum / tracer.techniques() as f64);
+        work.large_steps.add((sum / tracer.techniques() as f64, false), Ways::Known);
         let proposal = self.tries.choose(tracer, stream, &mut self.proposal);
         if let (Some(found), Family::Multiplexed) = (&proposal, self.family) {
             let number = (found.technique as f64 + stream.number()) / tracer.techniques() as f64;

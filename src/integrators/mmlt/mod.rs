@@ -14,12 +14,12 @@ mod chain;
 mod lane;
 mod path_steps;
 
-use super::chains::{LANES, Mean, Worth, batch_samples, independent, share, starts};
+use super::chains::{LANES, Light, Worth, batch_samples, independent, share, starts};
 use super::{Acceptance, ChainReport, Counts, path::Path, render::Settings};
 use crate::film::{Film, Kernel, Splats};
 use crate::markov::{ChainState, Mutations, Scales, Tracer};
 use crate::math::{Stream, Walk};
-use crate::path_space::{Gain, Weights};
+use crate::path_space::{Gain, Ways, Weights};
 use crate::paths::Open;
 use crate::scene::{Caster, Scene};
 use lane::{Job, Lane};
@@ -41,7 +41,7 @@ pub(super) enum Family {
 struct Length {
     tracer: Tracer,
     scales: Arc<[Scales]>,
-    mean: Mean,
+    light: Light,
     /// Batches of independent samples drawn.
     batches: u64,
     worth: Worth,
@@ -81,7 +81,7 @@ impl Mmlt {
                 let tracer = Tracer { edges };
                 let scales = scales(tracer, &mutations, size, open);
                 let weights = Weights::even(mutations.path_space.kinds);
-                Length { tracer, scales, mean: Mean::default(), batches: 0, worth: Worth::default(), weights }
+                Length { tracer, scales, light: Light::default(), batches: 0, worth: Worth::default(), weights }
             })
             .collect();
         Self {
@@ -108,14 +108,15 @@ impl Mmlt {
         let targets = independent(scene, samples, memory, |caster, (lane, state), sample| {
             let mut stream = Stream::new(self.seed, &key(sample));
             if lane.links(caster) {
-                return lane.draw(caster, tracer, &mut stream).map_or(0.0, |(_, worth)| worth);
+                let drawn = lane.draw(caster, (tracer, Ways::All), &mut stream);
+                return drawn.map_or((0.0, false), |drawn| (drawn.worth, drawn.hidden));
             }
             state.reset();
-            lane.find(caster, tracer, state, &mut stream).map_or(0.0, |found| found.luminance)
+            (lane.find(caster, tracer, state, &mut stream).map_or(0.0, |found| found.luminance), false)
         });
         length.batches += 1;
-        targets.iter().for_each(|target| length.mean.add(*target));
-        let caster = Caster::new(scene);
+        targets.iter().for_each(|target| length.light.add(*target, Ways::All));
+        let (caster, targets) = (Caster::new(scene), targets.into_iter().map(|(target, _)| target).collect::<Vec<_>>());
         for (lane, (chosen, stream)) in self.lanes.iter_mut().zip(starts(&targets, self.seed, edges)) {
             let draws = Stream::new(self.seed, &key(chosen));
             lane.chains[index] = lane.start(&caster, tracer, state.clone(), draws, stream);
@@ -146,9 +147,9 @@ impl Mmlt {
 
     /// How a pass divides one mutation per pixel among the lengths: in proportion to their light.
     fn plan(&mut self, pixels: f64) -> Vec<Share> {
-        let total: f64 = self.lengths.iter().map(|length| length.mean.mean()).sum();
+        let total: f64 = self.lengths.iter().map(|length| length.light.mean()).sum();
         let part = |length: &mut Length| {
-            let b = length.mean.mean();
+            let b = length.light.mean();
             let mutations = if b > 0.0 { (b / total * pixels).ceil() } else { 0.0 };
             let worth = length.worth.next(b) * pixels / mutations.max(1.0);
             Share { tracer: length.tracer, mutations: mutations as u64, worth, weights: length.weights }
@@ -159,7 +160,7 @@ impl Mmlt {
     pub(super) fn pass(&mut self, scene: &Scene, film: &mut Film, pass: u64, counts: &mut Counts) {
         self.direct.pass(scene, film, pass, counts);
         for index in 0..self.lengths.len() {
-            if self.lengths[index].mean.sum == 0.0 {
+            if self.lengths[index].light.mean() == 0.0 {
                 self.explore(scene, &film.kernel, index);
             }
         }
@@ -174,7 +175,7 @@ impl Mmlt {
         for job in &jobs {
             film.report(&job.health);
             for (length, found) in self.lengths.iter_mut().zip(&job.large_steps) {
-                length.mean.merge(found);
+                length.light.merge(found);
             }
         }
         counts.add(plan.iter().map(|share| share.mutations).sum(), jobs.iter().map(|job| job.rays).sum());
@@ -199,8 +200,8 @@ impl Mmlt {
         }
         let report = |(index, length): (usize, &Length)| ChainReport {
             length: length.tracer.edges,
-            mean: length.mean.mean(),
-            standard_error: length.mean.error(),
+            mean: length.light.mean(),
+            standard_error: length.light.error(),
             chains: chains(index).count(),
             failed_inversions: chains(index).map(|chain| chain.failed).sum(),
         };

@@ -5,9 +5,12 @@ use super::chain::{Chain, LARGE, PRIMARY};
 use super::lane::{Lane, Work};
 use crate::markov::{ChainState, Tracer, retell};
 use crate::math::Stream;
-use crate::path_space::Proposed;
+use crate::path_space::{Drawn, Proposed, Ways};
 use crate::paths::{Found, FullPath};
 use crate::scene::Caster;
+
+/// The share of independent paths in a chain that are drawn in all ways.
+const SEEKING: f64 = 0.05;
 
 /// How far the target may be off, relative to itself, after the way to rows and back.
 const ROUND_TRIP: f64 = 1e-6;
@@ -18,11 +21,16 @@ impl Lane {
         self.family == Family::Fused && self.mutations.path_space.links(scene)
     }
 
-    /// An independent path, with what it is worth.
-    pub(super) fn draw(&mut self, scene: &Caster<'_>, tracer: Tracer, stream: &mut Stream) -> Option<(Found, f64)> {
+    /// An independent path.
+    pub(super) fn draw(
+        &mut self,
+        scene: &Caster<'_>,
+        (tracer, ways): (Tracer, Ways),
+        stream: &mut Stream,
+    ) -> Option<Drawn> {
         let Self { path_space, proposal, health, .. } = self;
         let by_technique = |stream: &mut Stream, path: &mut FullPath| tracer.sample(scene, stream, path, health);
-        path_space.sample(scene, tracer.edges, stream, proposal, by_technique)
+        path_space.sample(scene, (tracer.edges, ways), stream, proposal, by_technique)
     }
 
     /// A chain that begins at the independent path that `draws` gives; `None` where its rows cannot be found.
@@ -35,7 +43,7 @@ impl Lane {
         mut stream: Stream,
     ) -> Option<Chain> {
         let found = if self.links(scene) {
-            let (found, _) = self.draw(scene, tracer, &mut draws)?;
+            let Drawn { found, .. } = self.draw(scene, (tracer, Ways::All), &mut draws)?;
             self.confirm(scene, tracer, found, None, &mut state, &mut stream).ok()?
         } else {
             self.find(scene, tracer, &mut state, &mut draws)?
@@ -59,12 +67,21 @@ impl Lane {
 
     /// A large step in path space.
     pub(super) fn independent_step(&mut self, chain: &mut Chain, work: &mut Work<'_>) {
-        let drawn = self.draw(work.scene, work.tracer, &mut chain.stream);
-        work.large_steps.add(drawn.map_or(0.0, |(_, worth)| worth));
-        let proposal = drawn.and_then(|(found, worth)| {
-            let ask = || self.path_space.worth(work.scene, (&chain.path, &chain.current));
-            chain.drawn = chain.drawn.or_else(ask);
-            Some((found, worth / chain.drawn?))
+        let Chain { stream, path, current, drawn: known, .. } = chain;
+        // What a hidden path is worth takes long to tell.
+        let ways = if stream.number() < SEEKING { Ways::All } else { Ways::Known };
+        let drawn = self.draw(work.scene, (work.tracer, ways), stream);
+        work.large_steps.add(drawn.map_or((0.0, false), |drawn| (drawn.worth, drawn.hidden)), ways);
+        let proposal = drawn.and_then(|Drawn { found, worth, .. }| {
+            let mut ask = || self.path_space.worth(work.scene, (path, current), ways, stream);
+            let before = match ways {
+                Ways::Known => {
+                    *known = known.or_else(ask);
+                    (*known)?
+                }
+                Ways::All => ask()?,
+            };
+            Some((found, worth / before))
         });
         self.move_path(chain, LARGE, proposal, work);
     }
