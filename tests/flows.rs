@@ -29,6 +29,10 @@ const BATCHES: u64 = 100;
 /// is worth much.
 const FEWEST: u64 = 30;
 
+/// Flows between paths that techniques hardly find, and that are worth more than this, count in proportion less: the same for
+/// both directions, so that they still cancel, and no single path decides.
+const MOST_WORTH: f64 = 3.0;
+
 /// A sum of what should cancel.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sum {
@@ -183,14 +187,22 @@ fn flows(scene: &Scene, target: Target, lengths: Lengths, (paths, batch): (u64, 
     };
     let mut spaces: Vec<_> = cases().into_iter().map(space).collect();
     let sampler = &mut PathSpace::new(PathMutations::default(), target);
+    let techniques = PathMutations { kinds: vec![Kind::Bidirectional].into(), ..PathMutations::default() };
+    let mut by_techniques = PathSpace::new(techniques, target);
+    let mut damping = |(found, path): (&Found, &FullPath), stream: &mut Stream| {
+        let worth = by_techniques.worth(&caster, (path, found), Ways::Known, stream);
+        worth.map_or(0.0, |worth| (MOST_WORTH / worth).min(1.0))
+    };
     let mut of_independent = WAYS.map(|_| Flows::default());
     for _ in 0..paths {
         let edges = lengths.least + (stream.number() * lengths.count() as f64) as usize;
         let Some((found, worth)) = draw(target, edges, &caster, &mut stream, &mut path) else { continue };
+        let own = damping((&found, &path), &mut stream);
         for (space, flows) in &mut spaces {
             let Proposed { outcome, .. } = space.propose(&caster, (&path, &found), &mut stream, &mut proposal);
             if let Ok((next, ratio)) = outcome {
-                flows.add(target, worth * ratio.min(1.0), [(&found, &path), (&next, &proposal)]);
+                let damped = own.min(damping((&next, &proposal), &mut stream));
+                flows.add(target, worth * ratio.min(1.0) * damped, [(&found, &path), (&next, &proposal)]);
             }
         }
         for (ways, flows) in WAYS.into_iter().zip(&mut of_independent) {
@@ -199,7 +211,8 @@ fn flows(scene: &Scene, target: Target, lengths: Lengths, (paths, batch): (u64, 
                 && let Some(from) = sampler.worth(&caster, (&path, &found), ways, &mut stream)
             {
                 let acceptance = (next.worth / from).min(1.0);
-                flows.add(target, worth * acceptance, [(&found, &path), (&next.found, &proposal)]);
+                let damped = own.min(damping((&next.found, &proposal), &mut stream));
+                flows.add(target, worth * acceptance * damped, [(&found, &path), (&next.found, &proposal)]);
             }
         }
     }
