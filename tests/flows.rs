@@ -259,6 +259,11 @@ fn flows_cancel_among_glossy_surfaces() {
     balance(&rooms::polished(SIZE), 20_000);
 }
 
+#[test]
+fn flows_cancel_where_light_is_hidden() {
+    balance(&rooms::mirrored(SIZE), 10_000);
+}
+
 /// Paths of each length in a batch that tell the light of classes.
 const PATHS: u64 = 8000;
 
@@ -284,7 +289,7 @@ fn light(scene: &Scene, batch: u64) -> BTreeMap<(usize, PathClass), [Sum; 2]> {
 
 #[test]
 fn independent_paths_have_the_light_of_every_class() {
-    for scene in [rooms::balls(SIZE), rooms::water(SIZE), rooms::polished(SIZE)] {
+    for scene in [rooms::balls(SIZE), rooms::water(SIZE), rooms::polished(SIZE), rooms::mirrored(SIZE)] {
         let merge = |mut all: BTreeMap<_, [Sum; 2]>, other: BTreeMap<_, [Sum; 2]>| {
             for (class, sums) in other {
                 all.entry(class).or_default().iter_mut().zip(&sums).for_each(|(sum, other)| sum.merge(other));

@@ -25,6 +25,21 @@ pub fn balls(size: usize) -> Scene {
     build(builder, pinhole(size, 0.7, DVec3::new(0.0, 0.0, 0.95), -DVec3::Z), 5)
 }
 
+/// A mirror on the wall and a small lamp: light that mirrors and a ball of glass hide from straight seeds.
+pub fn mirrored(size: usize) -> Scene {
+    let mut builder = Builder::new();
+    let wall = builder.bsdf(diffuse(0.6));
+    builder.mesh(room(), wall, None).unwrap();
+    let clear = builder.bsdf(glass(1.5));
+    builder.solid(Solid::sphere(DVec3::new(-0.3, -0.5, 0.0), 0.4), clear, None).unwrap();
+    let metal = Conductor { index: None, specular_reflectance: Spectrum::grey(0.9).into() };
+    let mirror = builder.bsdf(Bsdf::Conductor(metal));
+    builder.solid(Solid::disk(DVec3::new(0.9, 0.0, 0.0), -DVec3::X, 0.7), mirror, None).unwrap();
+    let lamp = Solid::disk(DVec3::new(0.2, 0.9, 0.0), -DVec3::Y, 0.1);
+    builder.solid(lamp, wall, Some(Spectrum::grey(50.0).into())).unwrap();
+    build(builder, pinhole(size, 0.7, DVec3::new(0.0, 0.0, 0.95), -DVec3::Z), 5)
+}
+
 /// Water over the floor of a room, with a light above it, through a lens: chains on either side of what the camera sees.
 pub fn water(size: usize) -> Scene {
     let mut builder = Builder::new();
