@@ -261,7 +261,7 @@ fn flows_cancel_among_glossy_surfaces() {
 
 #[test]
 fn flows_cancel_where_light_is_hidden() {
-    balance(&rooms::mirrored(SIZE), 10_000);
+    balance(&rooms::mirrored(SIZE), 20_000);
 }
 
 /// Paths of each length in a batch that tell the light of classes.
