@@ -108,7 +108,8 @@ pub fn retell(
     };
     for m in 0..s {
         let index = tracer.light_rows() + m;
-        let same = m > 1 && stays(m - 1, &[m - 2, m - 1, m]);
+        let [earlier, last] = [m.saturating_sub(2), m.saturating_sub(1)];
+        let same = stays(last, &[earlier, last, m]);
         let row = if same { state.last(index) } else { path.light_row(scene, m, stream.row())? };
         state.set(index, row);
     }
