@@ -115,10 +115,13 @@ pub(super) fn connect(
 fn straight(scene: &Caster<'_>, from: &Node, light: &Node, count: usize) -> Result<Chain, Rejection> {
     let VertexKind::Light(_, Start::Surface { .. }) = light.kind else { return Err(Rejection::Unsuitable) };
     let direction = (light.position - from.position).try_normalize().ok_or(Rejection::Singular)?;
-    let bend = |surface: &Surface, direction: DVec3| {
-        Turn::at(scene, surface, -direction, direction)?.onward(surface.frame.normal, -direction)
-    };
+    let bend = |surface: &Surface, direction: DVec3| pass(scene, surface, direction);
     Way::trace(scene, from, count, direction, bend)?.settle(scene, from, light)
+}
+
+/// Where light goes that passes a smooth boundary along `direction`; `None` where it is reflected totally, or no law is known.
+fn pass(scene: &Caster<'_>, surface: &Surface, direction: DVec3) -> Option<DVec3> {
+    Turn::at(scene, surface, -direction, direction)?.onward(surface.frame.normal, -direction)
 }
 
 /// The chain from x_d to a point of a light to which a random seed walks. The way that the seed tries tells which surfaces it
@@ -138,12 +141,9 @@ fn random(
     let scatter = scene.scatter(surface, surface.frame.to_local(back), stream.row(), Walk::FromCamera);
     let scatter = scatter.filter(|scatter| !scatter.delta).ok_or(Rejection::Unsuitable)?;
     let mut reflected: ArrayVec<bool, MOST_LINKS> = ArrayVec::new();
-    let pass = |surface: &Surface, direction: DVec3| {
-        Turn::at(scene, surface, -direction, direction)?.onward(surface.frame.normal, -direction)
-    };
     let reflect = |surface: &Surface, direction: DVec3| Turn::Reflected.onward(surface.frame.normal, -direction);
     let choose = |surface: &Surface, direction: DVec3| {
-        let passed = if stream.number() < 0.5 { pass(surface, direction) } else { None };
+        let passed = if stream.number() < 0.5 { pass(scene, surface, direction) } else { None };
         reflected.try_push(passed.is_none()).ok()?;
         passed.or_else(|| reflect(surface, direction))
     };
@@ -162,7 +162,7 @@ fn random(
         let mut planned = reflected.iter();
         let bend = |surface: &Surface, direction: DVec3| match planned.next()? {
             true => reflect(surface, direction),
-            false => pass(surface, direction),
+            false => pass(scene, surface, direction),
         };
         let direction = tried.lerp(unfolded, share).try_normalize()?;
         Way::trace(scene, from, d - 1, direction, bend).ok().filter(|other| other.is_like(&way))
@@ -204,8 +204,8 @@ impl Way {
 
     /// Whether it passes the same sides of things as another, as far as normals tell.
     fn is_like(&self, other: &Self) -> bool {
-        let pairs = self.surfaces.iter().zip(&other.surfaces);
-        pairs.into_iter().all(|((a, _), (b, _))| a.frame.normal.dot(b.frame.normal) > ALIKE)
+        let mut pairs = self.surfaces.iter().zip(&other.surfaces);
+        pairs.all(|((a, _), (b, _))| a.frame.normal.dot(b.frame.normal) > ALIKE)
     }
 
     /// The chain nearby that leads to a point of a light.
