@@ -12,12 +12,13 @@ use pathblend::film::{Health, PathClass};
 use pathblend::markov::Tracer;
 use pathblend::math::Stream;
 use pathblend::path_space::{
-    Drawn, Gain, Kind, Lengths, PathMutations, PathSpace, Proposed, Radii, Target, Ways, Weights,
+    Drawn, Gain, Kind, Lengths, Mixture, PathMutations, PathSpace, Proposed, Radii, Seeds, Target, Ways, Weights,
 };
 use pathblend::paths::{Found, FullPath, Techniques, connect_visible};
 use pathblend::scene::{Caster, Scene};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 const SIZE: usize = 8;
 const LENGTHS: Lengths = Lengths { least: 3, most: 5 };
@@ -148,7 +149,9 @@ fn draw(
     stream: &mut Stream,
     path: &mut FullPath,
 ) -> Option<(Found, f64)> {
-    let found = Tracer { edges }.sample(scene, stream, path, &mut Health::default())?;
+    let tracer = Tracer { edges };
+    let technique = tracer.technique(stream.number());
+    let found = tracer.sample(scene, technique, stream, path, &mut Health::default())?;
     let worth = found.luminance;
     if target == Target::Technique {
         return Some((found, worth));
@@ -157,25 +160,52 @@ fn draw(
     Some((Found { value: alone.value, luminance: alone.value.luminance(), ..found }, worth))
 }
 
-/// The ways in which independent paths come about.
-const WAYS: [Ways; 2] = [Ways::Known, Ways::All];
+/// How independent paths come about: in which ways, and whether these are adapted to what they find.
+const DRAWS: [(Ways, bool); 3] = [(Ways::Known, false), (Ways::All, false), (Ways::All, true)];
 
 /// An independent path.
 fn independent(
     space: &mut PathSpace,
     scene: &Caster<'_>,
-    (edges, ways): (usize, Ways),
+    (mixture, ways): (&Mixture, Ways),
     stream: &mut Stream,
     path: &mut FullPath,
 ) -> Option<Drawn> {
-    let tracer = Tracer { edges };
+    let tracer = Tracer { edges: mixture.edges() };
     let by_technique =
-        |stream: &mut Stream, path: &mut FullPath| tracer.sample(scene, stream, path, &mut Health::default());
-    space.sample(scene, (edges, ways), stream, path, by_technique)
+        |s, stream: &mut Stream, path: &mut FullPath| tracer.sample(scene, s, stream, path, &mut Health::default());
+    space.sample(scene, (mixture, ways), stream, path, by_technique)
+}
+
+/// Samples that adapt a mixture.
+const SAMPLES: u64 = 5000;
+
+/// For paths of these lengths, what they are drawn by as long as nothing is known, and once something is.
+fn mixtures(scene: &Scene, lengths: Lengths) -> Vec<[Mixture; 2]> {
+    let mutations = PathMutations::default();
+    let seeds = Arc::new(Seeds::seen(scene, 3));
+    let both = |edges: usize| {
+        let even = Mixture::even(scene, &mutations, edges, seeds.clone());
+        let (caster, mut path) = (Caster::new(scene), FullPath::default());
+        let mut space = PathSpace::new(mutations, Target::Technique);
+        let mut draw = |number: u64| {
+            let mut stream = Stream::new(4, &[edges as u64, number]);
+            independent(&mut space, &caster, (&even, Ways::All), &mut stream, &mut path)
+        };
+        let drawn: Vec<Drawn> = (0..SAMPLES).filter_map(&mut draw).collect();
+        let adapted = even.adapted(drawn.iter());
+        [even, adapted]
+    };
+    (lengths.least..=lengths.most).map(both).collect()
 }
 
 /// What flows, by case; and by independent paths.
-fn flows(scene: &Scene, target: Target, lengths: Lengths, (paths, batch): (u64, u64)) -> Vec<Flows> {
+fn flows(
+    scene: &Scene,
+    (target, lengths): (Target, Lengths),
+    mixtures: &[[Mixture; 2]],
+    (paths, batch): (u64, u64),
+) -> Vec<Flows> {
     let caster = Caster::new(scene);
     let [mut path, mut proposal] = [FullPath::default(), FullPath::default()];
     let mut stream = Stream::new(9, &[batch, lengths.least as u64]);
@@ -189,11 +219,14 @@ fn flows(scene: &Scene, target: Target, lengths: Lengths, (paths, batch): (u64, 
     let sampler = &mut PathSpace::new(PathMutations::default(), target);
     let techniques = PathMutations { kinds: vec![Kind::Bidirectional].into(), ..PathMutations::default() };
     let mut by_techniques = PathSpace::new(techniques, target);
+    let even = |edges| Mixture::even(scene, &techniques, edges, Arc::default());
+    let even: Vec<Mixture> = (lengths.least..=lengths.most).map(even).collect();
     let mut damping = |(found, path): (&Found, &FullPath), stream: &mut Stream| {
-        let worth = by_techniques.worth(&caster, (path, found), Ways::Known, stream);
+        let mixture = &even[path.edges() - lengths.least];
+        let worth = by_techniques.worth(&caster, (path, found), (mixture, Ways::Known), stream);
         worth.map_or(0.0, |worth| (MOST_WORTH / worth).min(1.0))
     };
-    let mut of_independent = WAYS.map(|_| Flows::default());
+    let mut of_independent = DRAWS.map(|_| Flows::default());
     for _ in 0..paths {
         let edges = lengths.least + (stream.number() * lengths.count() as f64) as usize;
         let Some((found, worth)) = draw(target, edges, &caster, &mut stream, &mut path) else { continue };
@@ -205,10 +238,11 @@ fn flows(scene: &Scene, target: Target, lengths: Lengths, (paths, batch): (u64, 
                 flows.add(target, worth * ratio.min(1.0) * damped, [(&found, &path), (&next, &proposal)]);
             }
         }
-        for (ways, flows) in WAYS.into_iter().zip(&mut of_independent) {
-            let edges = lengths.least + (stream.number() * lengths.count() as f64) as usize;
-            if let Some(next) = independent(sampler, &caster, (edges, ways), &mut stream, &mut proposal)
-                && let Some(from) = sampler.worth(&caster, (&path, &found), ways, &mut stream)
+        for ((ways, adapted), flows) in DRAWS.into_iter().zip(&mut of_independent) {
+            let [from, to] = [edges - lengths.least, (stream.number() * lengths.count() as f64) as usize]
+                .map(|place| (&mixtures[place][usize::from(adapted)], ways));
+            if let Some(next) = independent(sampler, &caster, to, &mut stream, &mut proposal)
+                && let Some(from) = sampler.worth(&caster, (&path, &found), from, &mut stream)
             {
                 let acceptance = (next.worth / from).min(1.0);
                 let damped = own.min(damping((&next.found, &proposal), &mut stream));
@@ -225,9 +259,14 @@ fn balance(scene: &Scene, paths: u64) {
     let one = |edges| (Target::Technique, Lengths { least: edges, most: edges });
     let mut failures = Vec::new();
     for (target, lengths) in [(Target::Path(LENGTHS), LENGTHS), one(3), one(4), one(5)] {
-        let batches = (0..BATCHES).into_par_iter().map(|batch| flows(scene, target, lengths, (paths, batch)));
+        let mixtures = mixtures(scene, lengths);
+        let batches = (0..BATCHES).into_par_iter();
+        let batches = batches.map(|batch| flows(scene, (target, lengths), &mixtures, (paths, batch)));
         let merge = |a: Vec<Flows>, b: Vec<Flows>| a.into_iter().zip(b).map(|(a, b)| a.merge(b)).collect();
-        let of_independent = WAYS.map(|ways| format!("independent, {ways:?}"));
+        let of_independent = DRAWS.map(|(ways, adapted)| {
+            let adapted = if adapted { ", adapted" } else { "" };
+            format!("independent, {ways:?}{adapted}")
+        });
         let names: Vec<String> = cases().into_iter().map(|(name, ..)| name).chain(of_independent).collect();
         let all = batches.reduce(|| vec![Flows::default(); names.len()], merge);
         for (name, Flows { between, drifts }) in names.into_iter().zip(&all) {
@@ -267,20 +306,24 @@ fn flows_cancel_where_light_is_hidden() {
 /// Paths of each length in a batch that tell the light of classes.
 const PATHS: u64 = 8000;
 
-/// The light of each class and length, by techniques and by independent paths.
-fn light(scene: &Scene, batch: u64) -> BTreeMap<(usize, PathClass), [Sum; 2]> {
+/// The light of each class and length, by techniques, by independent paths, and by such that come about in adapted ways.
+fn light(scene: &Scene, mixtures: &[[Mixture; 2]], batch: u64) -> BTreeMap<(usize, PathClass), [Sum; 3]> {
     let caster = Caster::new(scene);
     let (mut stream, mut path, mut health) = (Stream::new(7, &[batch]), FullPath::default(), Health::default());
     let mut space = PathSpace::new(PathMutations::default(), Target::Technique);
-    let mut light: BTreeMap<_, [Sum; 2]> = BTreeMap::new();
+    let mut light: BTreeMap<_, [Sum; 3]> = BTreeMap::new();
     for _ in 0..PATHS {
-        for edges in LENGTHS.least..=LENGTHS.most {
-            let tracer = Tracer { edges };
-            if let Some(found) = tracer.sample(&caster, &mut stream, &mut path, &mut health) {
-                light.entry((edges, found.class)).or_default()[0].add(found.luminance);
+        for mixtures in mixtures {
+            let tracer = Tracer { edges: mixtures[0].edges() };
+            let technique = tracer.technique(stream.number());
+            if let Some(found) = tracer.sample(&caster, technique, &mut stream, &mut path, &mut health) {
+                light.entry((tracer.edges, found.class)).or_default()[0].add(found.luminance);
             }
-            if let Some(drawn) = independent(&mut space, &caster, (edges, Ways::All), &mut stream, &mut path) {
-                light.entry((edges, drawn.found.class)).or_default()[1].add(drawn.worth);
+            for (place, mixture) in (1..).zip(mixtures) {
+                let drawn = independent(&mut space, &caster, (mixture, Ways::All), &mut stream, &mut path);
+                if let Some(Drawn { found, worth, .. }) = drawn {
+                    light.entry((tracer.edges, found.class)).or_default()[place].add(worth);
+                }
             }
         }
     }
@@ -290,21 +333,24 @@ fn light(scene: &Scene, batch: u64) -> BTreeMap<(usize, PathClass), [Sum; 2]> {
 #[test]
 fn independent_paths_have_the_light_of_every_class() {
     for scene in [rooms::balls(SIZE), rooms::water(SIZE), rooms::polished(SIZE), rooms::mirrored(SIZE)] {
-        let merge = |mut all: BTreeMap<_, [Sum; 2]>, other: BTreeMap<_, [Sum; 2]>| {
+        let merge = |mut all: BTreeMap<_, [Sum; 3]>, other: BTreeMap<_, [Sum; 3]>| {
             for (class, sums) in other {
                 all.entry(class).or_default().iter_mut().zip(&sums).for_each(|(sum, other)| sum.merge(other));
             }
             all
         };
-        let light = (0..BATCHES).into_par_iter().map(|batch| light(&scene, batch)).reduce(BTreeMap::new, merge);
-        for ((edges, class), [techniques, independent]) in light {
-            if techniques.count.min(independent.count) < FEWEST {
-                continue;
+        let mixtures = mixtures(&scene, LENGTHS);
+        let batches = (0..BATCHES).into_par_iter().map(|batch| light(&scene, &mixtures, batch));
+        for ((edges, class), [techniques, independent @ ..]) in batches.reduce(BTreeMap::new, merge) {
+            for independent in independent {
+                if techniques.count.min(independent.count) < FEWEST {
+                    continue;
+                }
+                let z = (techniques.sum - independent.sum).abs() / (techniques.squares + independent.squares).sqrt();
+                let [a, b] = [techniques, independent].map(|sum| format!("{:.1} ± {:.1}", sum.sum, sum.squares.sqrt()));
+                println!("| {edges} | {} | {a} | {b} | {z:.1} |", class.word());
+                assert!(z < SIGMAS, "{edges} edges, {}: {a}, {b}", class.word());
             }
-            let z = (techniques.sum - independent.sum).abs() / (techniques.squares + independent.squares).sqrt();
-            let [a, b] = [techniques, independent].map(|sum| format!("{:.1} ± {:.1}", sum.sum, sum.squares.sqrt()));
-            println!("| {edges} | {} | {a} | {b} | {z:.1} |", class.word());
-            assert!(z < SIGMAS, "{edges} edges, {}: {a}, {b}", class.word());
         }
     }
 }

@@ -52,10 +52,15 @@ impl Mean {
         if self.samples == 0 { 0.0 } else { self.sum / self.samples as f64 }
     }
 
+    /// Variance of one sample.
+    fn variance(&self) -> f64 {
+        let mean = self.mean();
+        (self.squares / self.samples.max(1) as f64 - mean * mean).max(0.0)
+    }
+
     /// Standard error of the mean.
     pub(super) fn error(&self) -> f64 {
-        let (n, mean) = (self.samples.max(1) as f64, self.mean());
-        ((self.squares / n - mean * mean).max(0.0) / n).sqrt()
+        (self.variance() / self.samples.max(1) as f64).sqrt()
     }
 }
 
@@ -83,6 +88,14 @@ impl Light {
 
     pub(super) fn mean(&self) -> f64 {
         self.open.mean() + self.hidden.mean()
+    }
+
+    /// How many mutations are due to this light beside others: the geometric mean of its mean and of the root of its mean
+    /// square. As many as the latter would be best for independent samples of it (Neyman's allocation); but that is told by
+    /// few of them where they vary most.
+    pub(super) fn due(&self) -> f64 {
+        let mean = self.mean();
+        (mean * (mean * mean + self.open.variance() + self.hidden.variance()).sqrt()).sqrt()
     }
 
     /// Standard error of the mean.

@@ -13,11 +13,12 @@ use crate::film::{Film, Health, Kernel, Splats};
 use crate::manifold::Rejection;
 use crate::markov::Tracer;
 use crate::math::Stream;
-use crate::path_space::{Drawn, Kind, Lengths, PathMutations, PathSpace, Proposed, Target, Ways};
+use crate::path_space::{Drawn, Kind, Lengths, Mixture, PathMutations, PathSpace, Proposed, Seeds, Target, Ways};
 use crate::paths::{Found, FullPath};
 use crate::scene::{Caster, Scene};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Mutations for each independent sample that refines b.
 const REFINEMENT: usize = 16;
@@ -55,6 +56,8 @@ pub(super) struct Mlt {
     direct: Path,
     lengths: Lengths,
     mutations: PathMutations,
+    /// How independent paths of each length are drawn.
+    mixtures: Vec<Mixture>,
     size: [usize; 2],
     mean: Mean,
     worth: Worth,
@@ -66,27 +69,31 @@ impl Mlt {
     pub(super) fn start(scene: &Scene, settings: &Settings) -> Self {
         let direct = settings.mutations.traced_edges();
         let lengths = Lengths { least: direct + 1, most: settings.max_depth };
-        let target = Target::Path(lengths);
+        let (target, mutations) = (Target::Path(lengths), settings.mutations.path_space);
+        let links = mutations.links(scene);
+        let seeds = Arc::new(if links { Seeds::seen(scene, settings.seed) } else { Seeds::default() });
+        let mixture = |edges| Mixture::even(scene, &mutations, edges, seeds.clone());
         Self {
             seed: settings.seed,
             direct: Path::up_to(settings, direct),
             lengths,
-            mutations: settings.mutations.path_space,
+            mutations,
+            mixtures: (lengths.least..=lengths.most).map(mixture).collect(),
             size: scene.camera.size,
             mean: Mean::default(),
             worth: Worth::default(),
             batches: 0,
-            lanes: (0..LANES).map(|_| Lane::new(settings.mutations.path_space, target)).collect(),
+            lanes: (0..LANES).map(|_| Lane::new(mutations, target)).collect(),
         }
     }
 
     /// Draws a batch of independent samples, and starts the chains if there are none and some sample finds light.
     fn sample(&mut self, scene: &Scene, samples: usize) -> u64 {
-        let (seed, batch, lengths) = (self.seed, self.batches, self.lengths);
+        let (seed, batch, lengths, mixtures) = (self.seed, self.batches, self.lengths, &self.mixtures);
         let stream = |number: usize| Stream::new(seed, &[2, 0, batch, number as u64]);
         let memory = || Lane::new(self.mutations, Target::Path(lengths));
         let targets = independent(scene, samples, memory, |caster, lane, number| {
-            lane.sample(caster, lengths, &mut stream(number)).map_or(0.0, |drawn| drawn.worth)
+            lane.sample(caster, mixtures, &mut stream(number)).map_or(0.0, |drawn| drawn.worth)
         });
         self.batches += 1;
         targets.iter().for_each(|target| self.mean.add(*target));
@@ -95,7 +102,7 @@ impl Mlt {
         }
         let caster = Caster::new(scene);
         for (lane, (chosen, own)) in self.lanes.iter_mut().zip(starts(&targets, seed, 0)) {
-            lane.start(&caster, lengths, &mut stream(chosen), own);
+            lane.start(&caster, mixtures, &mut stream(chosen), own);
         }
         samples as u64
     }
@@ -144,18 +151,17 @@ impl Lane {
     }
 
     /// An independent path of any of the lengths, all as likely.
-    fn sample(&mut self, scene: &Caster<'_>, lengths: Lengths, stream: &mut Stream) -> Option<Drawn> {
-        let count = lengths.count() as f64;
-        let tracer = Tracer { edges: lengths.least + (stream.number() * count) as usize };
-        let Self { mutations, proposal, health, .. } = self;
-        let by_technique = |stream: &mut Stream, path: &mut FullPath| tracer.sample(scene, stream, path, health);
-        let drawn = mutations.sample(scene, (tracer.edges, Ways::All), stream, proposal, by_technique)?;
-        Some(Drawn { worth: drawn.worth * count, ..drawn })
+    fn sample(&mut self, scene: &Caster<'_>, mixtures: &[Mixture], stream: &mut Stream) -> Option<Drawn> {
+        let mixture = mixtures.get((stream.number() * mixtures.len() as f64) as usize)?;
+        let (tracer, Self { mutations, proposal, health, .. }) = (Tracer { edges: mixture.edges() }, self);
+        let by_technique = |s, stream: &mut Stream, path: &mut FullPath| tracer.sample(scene, s, stream, path, health);
+        let drawn = mutations.sample(scene, (mixture, Ways::All), stream, proposal, by_technique)?;
+        Some(Drawn { worth: drawn.worth * mixtures.len() as f64, ..drawn })
     }
 
     /// Begins at the sample that `draws` gives.
-    fn start(&mut self, scene: &Caster<'_>, lengths: Lengths, draws: &mut Stream, stream: Stream) {
-        let Some(Drawn { found: current, .. }) = self.sample(scene, lengths, draws) else { return };
+    fn start(&mut self, scene: &Caster<'_>, mixtures: &[Mixture], draws: &mut Stream, stream: Stream) {
+        let Some(Drawn { found: current, .. }) = self.sample(scene, mixtures, draws) else { return };
         let (path, tallies, rejections) = (std::mem::take(&mut self.proposal), Default::default(), BTreeMap::new());
         self.chain = Some(Chain { stream, current, path, weight: 0.0, tallies, rejections });
     }

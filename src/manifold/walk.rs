@@ -207,8 +207,9 @@ impl Chain {
     /// The same chain when it sets out towards `first`; `None` where it meets something else on its way.
     fn trace(&self, scene: &Caster<'_>, start: &Node, first: DVec3) -> Option<Traced> {
         let mut links = ArrayVec::new();
-        let mut direction = (first - start.position).try_normalize()?;
-        let mut origin = start.leave(direction);
+        let mut origin = start.leave(first - start.position);
+        // From where the ray sets out, so that it meets what it is aimed at: steps end with that.
+        let mut direction = (first - origin.point).try_normalize()?;
         for link in &self.0 {
             let surface = scene.intersect(origin, direction)?;
             if surface.bsdf != link.surface.bsdf {

@@ -74,15 +74,15 @@ impl Tracer {
         self.connect(scene, path, health)
     }
 
-    /// A path of any technique, all as likely, left in `path`; `None` where it carries no light.
+    /// A path of technique `s`, left in `path`; `None` where it carries no light.
     pub fn sample(
         self,
         scene: &Caster<'_>,
+        s: usize,
         stream: &mut Stream,
         path: &mut FullPath,
         health: &mut Health,
     ) -> Option<Found> {
-        let s = self.technique(stream.number());
         let first = stream.row();
         self.walk_camera(scene, first, &mut Fresh(stream), self.techniques() - s, path)?;
         self.walk_light(scene, &mut Fresh(stream), s, path)?;

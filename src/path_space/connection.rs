@@ -14,7 +14,8 @@
 
 use super::bidirectional::{Range, resample};
 use super::gamma::Part;
-use super::{Draft, View};
+use super::seeds::Bend;
+use super::{Draft, Seeds, View};
 use crate::emitter::Start;
 use crate::manifold::{Chain, Goal, MOST_LINKS, Rejection, Turn};
 use crate::math::{Frame, Stream, Walk};
@@ -26,6 +27,8 @@ use glam::DVec3;
 /// Two chains are the same if their vertices are no further apart, relative to the distance of their ends.
 const SAME: f64 = 1e-7;
 
+/// Share of the random seeds that begin with a chain that light is seen to take.
+const AS_SEEN: f64 = 0.75;
 /// Share of the random seeds that take the way that they try as it is.
 const AS_TRIED: f64 = 0.25;
 /// How far others turn from there towards the light's image: as far as can be.
@@ -77,12 +80,13 @@ pub(super) fn propose(
 }
 
 /// Where a walk to a light begins.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Seed {
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Seed<'a> {
     /// The straight way there, bent where it meets boundaries: it depends on nothing but the ends.
     Straight,
-    /// A way that scatters at random where the link begins, and is reflected or refracted at random at each boundary (Zeltner, Georgiev and Jakob 2020, "Specular Manifold Sampling").
-    Random,
+    /// A way that scatters at random where the link begins, and is reflected or refracted at random at each boundary (Zeltner,
+    /// Georgiev and Jakob 2020, "Specular Manifold Sampling"); or one that goes as some light is seen to come.
+    Random(&'a Seeds),
 }
 
 /// Links x_d with a light.
@@ -90,7 +94,7 @@ pub(super) fn connect(
     scene: &Caster<'_>,
     old: &Course,
     d: usize,
-    seed: Seed,
+    seed: Seed<'_>,
     stream: &mut Stream,
     new: &mut Course,
 ) -> Result<(), Rejection> {
@@ -98,7 +102,7 @@ pub(super) fn connect(
     let light = Node::light(id, start);
     let chain = match seed {
         Seed::Straight => straight(scene, &old.nodes[d], &light, d - 1)?,
-        Seed::Random => random(scene, old, d, &light, stream)?,
+        Seed::Random(seeds) => random(scene, (old, d), &light, seeds, stream)?,
     };
     new.clone_from(old);
     for (link, node) in chain.links().iter().zip(new.nodes[1..d].iter_mut().rev()) {
@@ -124,54 +128,76 @@ fn pass(scene: &Caster<'_>, surface: &Surface, direction: DVec3) -> Option<DVec3
     Turn::at(scene, surface, -direction, direction)?.onward(surface.frame.normal, -direction)
 }
 
-/// The chain from x_d to a point of a light to which a random seed walks. The way that the seed tries tells which surfaces it
-/// meets, and which of them reflect. Most seeds unfold it: they set out for the light's image in the planes of these, as the
-/// straight one does for the light, or as far towards it as they meet the same sides of things.
+/// The chain from x_d to a point of a light to which a random seed walks. The way that it tries tells which surfaces it meets,
+/// and which of them reflect. Where some do, most seeds unfold it: they set out for the light's image in the planes of these,
+/// as the straight one does for the light, or as far towards it as they meet the same sides of things.
 fn random(
     scene: &Caster<'_>,
-    course: &Course,
-    d: usize,
+    (course, d): (&Course, usize),
     light: &Node,
+    seeds: &Seeds,
     stream: &mut Stream,
 ) -> Result<Chain, Rejection> {
     let VertexKind::Light(_, Start::Surface { .. }) = light.kind else { return Err(Rejection::Unsuitable) };
+    let from = &course.nodes[d];
+    let seen = if stream.number() < AS_SEEN { seeds.draw(d - 1, from.position, stream) } else { None };
+    let mut own = ArrayVec::new();
+    let (tried, bends) = match seen {
+        Some(seen) => ((seen[0].position - from.position).try_normalize().ok_or(Rejection::Singular)?, seen),
+        None => (attempt(scene, (course, d), stream, &mut own)?, &*own),
+    };
+    let follow = |direction: DVec3| {
+        let mut planned = bends.iter();
+        let bend = |surface: &Surface, direction: DVec3| match planned.next()?.reflected {
+            true => reflect(surface, direction),
+            false => pass(scene, surface, direction),
+        };
+        Way::trace(scene, from, d - 1, direction, bend)
+    };
+    let mut mirrors = bends.iter().rev().filter(|bend| bend.reflected).peekable();
+    if mirrors.peek().is_some() && stream.number() >= AS_TRIED {
+        let image = mirrors.fold(light.position, |image, Bend { position, normal, .. }| {
+            image - normal * (2.0 * normal.dot(image - position))
+        });
+        let unfolded = (image - from.position).try_normalize().ok_or(Rejection::Singular)?;
+        let towards = |share: f64| follow(tried.lerp(unfolded, share).try_normalize()?).ok();
+        let way = SHARES.into_iter().filter_map(towards).find(|way| way.is_like(bends));
+        if let Some(way) = way {
+            return way.settle(scene, from, light);
+        }
+    }
+    follow(tried)?.settle(scene, from, light)
+}
+
+/// Tries a way from x_d through smooth boundaries, at each of which it passes or is reflected by chance: where it sets out,
+/// and what it does.
+fn attempt(
+    scene: &Caster<'_>,
+    (course, d): (&Course, usize),
+    stream: &mut Stream,
+    bends: &mut ArrayVec<Bend, MOST_LINKS>,
+) -> Result<DVec3, Rejection> {
     let from = &course.nodes[d];
     let surface = from.surface().ok_or(Rejection::Unsuitable)?;
     let back = course.direction(scene, d).ok_or(Rejection::Singular)?;
     let scatter = scene.scatter(surface, surface.frame.to_local(back), stream.row(), Walk::FromCamera);
     let scatter = scatter.filter(|scatter| !scatter.delta).ok_or(Rejection::Unsuitable)?;
-    let mut reflected: ArrayVec<bool, MOST_LINKS> = ArrayVec::new();
-    let reflect = |surface: &Surface, direction: DVec3| Turn::Reflected.onward(surface.frame.normal, -direction);
-    let choose = |surface: &Surface, direction: DVec3| {
+    let direction = surface.frame.to_world(scatter.direction);
+    Way::trace(scene, from, d - 1, direction, |surface, direction| {
         let passed = if stream.number() < 0.5 { pass(scene, surface, direction) } else { None };
-        reflected.try_push(passed.is_none()).ok()?;
+        let (position, normal) = (surface.position, surface.frame.normal);
+        bends.try_push(Bend { position, normal, reflected: passed.is_none() }).ok()?;
         passed.or_else(|| reflect(surface, direction))
-    };
-    let tried = surface.frame.to_world(scatter.direction);
-    let way = Way::trace(scene, from, d - 1, tried, choose)?;
-    if stream.number() < AS_TRIED {
-        return way.settle(scene, from, light);
-    }
-    let mirrored = way.surfaces.iter().zip(&reflected).rev().filter(|(_, reflected)| **reflected);
-    let image = mirrored.fold(light.position, |image, ((surface, _), _)| {
-        let normal = surface.frame.normal;
-        image - normal * (2.0 * normal.dot(image - surface.position))
-    });
-    let unfolded = (image - from.position).try_normalize().ok_or(Rejection::Singular)?;
-    let follow = |share: f64| {
-        let mut planned = reflected.iter();
-        let bend = |surface: &Surface, direction: DVec3| match planned.next()? {
-            true => reflect(surface, direction),
-            false => pass(scene, surface, direction),
-        };
-        let direction = tried.lerp(unfolded, share).try_normalize()?;
-        Way::trace(scene, from, d - 1, direction, bend).ok().filter(|other| other.is_like(&way))
-    };
-    SHARES.into_iter().find_map(follow).unwrap_or_else(|| way.clone()).settle(scene, from, light)
+    })?;
+    Ok(direction)
+}
+
+/// Where light goes that a surface reflects.
+fn reflect(surface: &Surface, direction: DVec3) -> Option<DVec3> {
+    Turn::Reflected.onward(surface.frame.normal, -direction)
 }
 
 /// A way through smooth boundaries, which need not lead to a light.
-#[derive(Clone)]
 struct Way {
     surfaces: ArrayVec<(Surface, bool), MOST_LINKS>,
     /// Where it leads.
@@ -202,10 +228,9 @@ impl Way {
         Ok(Self { surfaces, direction })
     }
 
-    /// Whether it passes the same sides of things as another, as far as normals tell.
-    fn is_like(&self, other: &Self) -> bool {
-        let mut pairs = self.surfaces.iter().zip(&other.surfaces);
-        pairs.all(|((a, _), (b, _))| a.frame.normal.dot(b.frame.normal) > ALIKE)
+    /// Whether it meets the same sides of things, as far as normals tell.
+    fn is_like(&self, bends: &[Bend]) -> bool {
+        self.surfaces.iter().zip(bends).all(|((surface, _), bend)| surface.frame.normal.dot(bend.normal) > ALIKE)
     }
 
     /// The chain nearby that leads to a point of a light.
@@ -227,8 +252,8 @@ fn has(course: &Course, d: usize, chain: &Chain) -> bool {
 }
 
 /// Whether a random seed from x_d finds the chain that `course` has.
-pub(super) fn finds(scene: &Caster<'_>, course: &Course, d: usize, stream: &mut Stream) -> bool {
-    random(scene, course, d, &course.nodes[0], stream).is_ok_and(|chain| has(course, d, &chain))
+pub(super) fn finds(scene: &Caster<'_>, course: &Course, d: usize, seeds: &Seeds, stream: &mut Stream) -> bool {
+    random(scene, (course, d), &course.nodes[0], seeds, stream).is_ok_and(|chain| has(course, d, &chain))
 }
 
 /// How likely the connection is, relative to the walk from the camera, to make of x_d the light's end that `course` has.

@@ -46,17 +46,21 @@ mod kinds;
 mod lens;
 mod link;
 mod manifold;
+mod mixture;
 mod multi_chain;
 mod perturb;
 mod retrace;
+mod seeds;
 mod steps;
 mod whole;
 
 pub use bidirectional::Lengths;
 pub use gains::{Gain, Weights, way};
 pub use kinds::{Kind, Kinds, PathMutations};
+pub use mixture::{Mixture, Way, Ways};
+pub use seeds::Seeds;
 pub use steps::Radii;
-pub use whole::{Drawn, Ways};
+pub use whole::Drawn;
 
 use judge::realise;
 

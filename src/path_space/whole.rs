@@ -1,23 +1,23 @@
 //! Whole paths, independent of all others: what tells the normalisation b, where chains begin, and their large steps. Beside
-//! the techniques of bidirectional path tracing, each as likely, a share λ of them is made by the [`super::connection`]: a
-//! walk from the camera up to x_d, and from there a chain of smooth boundaries to a point of a light, with d drawn evenly
-//! from 2 … k − 1. So light comes in that techniques hardly ever find. All ways are one density,
+//! the techniques of bidirectional path tracing, some of them are made by the [`super::connection`]: a walk from the camera
+//! up to x_d, and from there a chain of smooth boundaries to a point of a light. So light comes in that techniques hardly
+//! ever find. All ways are one density,
 //!
 //! ```text
-//! q(x) = (1 − λ)/(k + 1) Σ_s p_s(x) + λ/(k − 2) m_d(x),
+//! q(x) = Σ_s α_s p_s(x) + λ_d m_d(x),
 //! ```
 //!
-//! where d is the first free vertex from the light. f/q is what a path is worth: its mean is b, and the acceptance of an
+//! where d is the first free vertex from the light, and α and λ are those of a [`Mixture`]. f/q is what a path is worth: its mean is b, and the acceptance of an
 //! independent path is the ratio of both paths' worth, where the technique is then drawn by the weights w_s, as jumps do.
 //!
 //! # Hidden light
 //! The seed of a link sets out straight for the light and is refracted. Where another chain leads there too, one that is
 //! reflected or passes another face, the path is hidden. Random seeds find some of these. Where they are sought with a share
-//! μ of the paths, the density of hidden ones has a factor that nobody knows, the probability p that a random seed walks to
+//! μ_d of the paths, the density of hidden ones has a factor that nobody knows, the probability p that a random seed walks to
 //! the chain that the path has:
 //!
 //! ```text
-//! q(x) = A + B p,   A = (1 − λ − μ)/(k + 1) Σ_s p_s(x),   B = μ/(k − 2) m_d(x).
+//! q(x) = A + B p,   A = Σ_s α_s p_s(x),   B = μ_d m_d(x).
 //! ```
 //!
 //! But 1/q can be told, since 1/(A + B p) = Σ_n r^n (1 − p)^n / (A + B) with r = B/(A + B): let K be the number of rounds
@@ -28,30 +28,21 @@
 //! As a large step it is exact as well. Take K into the state, with the target f σ K P(K | σ), whose sum over K is f. A path
 //! that is drawn comes with the density q P(K | σ), so the ratio of target and density is f K/(A + B), again what it is
 //! worth. A path that has come by another mutation draws its K anew, from K P(K | σ) σ: that is the law of K₁ + K₂ − 1 for
-//! two geometric numbers. More than [`MOST_ROUNDS`] end in a rejection, for both ways alike; only b misses such paths.
+//! two geometric numbers. More than [`MOST_ROUNDS`] end in a rejection, for both ways alike; only b misses such paths. The mean
+//! of some such numbers stands for K, so that it varies less: of those of a path that is there, one has the other law.
 
 use super::connection::Seed;
-use super::{Kind, PathMutations, PathSpace, View, connection, realise};
+use super::mixture::{Mixture, Way, Ways};
+use super::{PathMutations, PathSpace, Seeds, View, connection, realise};
 use crate::emitter::Start;
 use crate::math::Stream;
 use crate::paths::{Course, Found, FullPath, Random, Techniques, VertexKind, trace_camera};
 use crate::scene::Caster;
 
-/// λ: the share of paths that are linked with a light over a manifold, where there are smooth boundaries at all.
-const LINKED: f64 = 0.25;
-/// μ: the share of paths that are linked by a random seed, where hidden light is sought.
-const SOUGHT: f64 = 0.25;
-/// The most rounds that tell how likely a path is.
+/// How often K is drawn for one path; the mean of them stands for it.
+const TRIALS: u32 = 4;
+/// The most rounds of a trial.
 const MOST_ROUNDS: u32 = 1000;
-
-/// In which ways independent paths come about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ways {
-    /// By techniques, and by links whose density is known.
-    Known,
-    /// By random seeds too.
-    All,
-}
 
 /// An independent path.
 #[derive(Clone, Copy, Debug)]
@@ -60,6 +51,8 @@ pub struct Drawn {
     pub found: Found,
     /// What it is worth: the luminance of f/q, in the mean.
     pub worth: f64,
+    /// The way that it came by.
+    pub way: Way,
     /// Whether its light is hidden from all but random seeds, and perhaps some technique.
     pub hidden: bool,
 }
@@ -74,54 +67,35 @@ struct Density {
     hidden: Option<usize>,
 }
 
-impl PathMutations {
-    /// λ and μ for paths of this length.
-    fn shares(&self, scene: &Caster<'_>, edges: usize, ways: Ways) -> [f64; 2] {
-        let links = edges > 2 && self.links(scene);
-        let linked = if links { LINKED } else { 0.0 };
-        let sought = if links && ways == Ways::All { SOUGHT } else { 0.0 };
-        [linked, sought]
-    }
-
-    /// Whether independent paths come about in more ways than the techniques have.
-    pub fn links(&self, scene: &Caster<'_>) -> bool {
-        self.kinds.has(Kind::Connection) && scene.refracts()
-    }
-}
-
 impl PathSpace {
-    /// Draws a path of `edges` edges, left in `path`; `None` where it carries no light. `by_technique` draws one of any
-    /// technique, all as likely.
+    /// Draws a path, left in `path`; `None` where it carries no light. `by_technique` draws one of a technique.
     pub fn sample(
         &mut self,
         scene: &Caster<'_>,
-        (edges, ways): (usize, Ways),
+        (mixture, ways): (&Mixture, Ways),
         stream: &mut Stream,
         path: &mut FullPath,
-        by_technique: impl FnOnce(&mut Stream, &mut FullPath) -> Option<Found>,
+        by_technique: impl FnOnce(usize, &mut Stream, &mut FullPath) -> Option<Found>,
     ) -> Option<Drawn> {
-        let [linked, sought] = self.mutations.shares(scene, edges, ways);
-        let number = if linked > 0.0 { stream.number() } else { 1.0 };
-        let technique = if number < linked {
-            self.link(scene, edges, Seed::Straight, stream, path)?;
-            0
-        } else if number < linked + sought {
-            self.link(scene, edges, Seed::Random, stream, path)?;
-            0
-        } else {
-            let found = by_technique(stream, path)?;
-            self.new.follow(path).then_some(found.technique)?
+        let way = mixture.draw(ways, stream.number());
+        let technique = match way {
+            Way::Technique(s) => {
+                by_technique(s, stream, path)?;
+                self.new.follow(path).then_some(s)?
+            }
+            Way::Link(d) => self.link(scene, (mixture.edges(), d), Seed::Straight, stream, path)?,
+            Way::Seek(d) => self.link(scene, (mixture.edges(), d), Seed::Random(&mixture.seeds), stream, path)?,
         };
         let alone = realise(scene, &mut self.new, technique, (&Techniques::ALONE, 1.0), path)?;
         path.densities(&mut self.densities);
         let Self { new, densities, mutations, walked, .. } = self;
-        let density = density(scene, (*mutations, ways), new, densities, walked);
-        if (linked..linked + sought).contains(&number) && density.sought == 0.0 {
+        let density = density(scene, *mutations, (mixture, ways), new, densities, walked);
+        if matches!(way, Way::Seek(_)) && density.sought == 0.0 {
             // Not hidden, and so none of its kind.
             return None;
         }
-        let rounds = density.rounds(scene, new, stream)?;
-        let worth = alone.luminance * f64::from(rounds) / (density.sure + density.sought);
+        let rounds = density.rounds(|| density.trial(scene, new, &mixture.seeds, stream), false)?;
+        let worth = alone.luminance * rounds / (density.sure + density.sought);
         let hidden = density.hidden.is_some();
         let found = match self.target.pick(&self.densities, stream) {
             Some(technique) => {
@@ -130,19 +104,18 @@ impl PathSpace {
             }
             None => alone,
         };
-        worth.is_finite().then_some(Drawn { found, worth, hidden })
+        worth.is_finite().then_some(Drawn { found, worth, way, hidden })
     }
 
-    /// A path that is linked with a light, left in `self.new`.
+    /// A path that is linked with a light, left in `self.new`, and its technique.
     fn link(
         &mut self,
         scene: &Caster<'_>,
-        edges: usize,
-        seed: Seed,
+        (edges, d): (usize, usize),
+        seed: Seed<'_>,
         stream: &mut Stream,
         path: &mut FullPath,
-    ) -> Option<()> {
-        let d = 2 + (stream.number() * (edges - 2) as f64) as usize;
+    ) -> Option<usize> {
         let (first, count) = (stream.row(), edges - d + 1);
         let film = scene.camera.film_position(first);
         trace_camera(scene, film, first, &mut Random(stream), count, usize::MAX, &mut path.camera);
@@ -151,7 +124,8 @@ impl PathSpace {
             return None;
         }
         self.old.begin(&path.camera, edges);
-        connection::connect(scene, &self.old, d, seed, stream, &mut self.new).ok()
+        connection::connect(scene, &self.old, d, seed, stream, &mut self.new).ok()?;
+        Some(0)
     }
 
     /// What `path`, which contributes `current` to a chain, would be worth if it were drawn.
@@ -159,7 +133,7 @@ impl PathSpace {
         &mut self,
         scene: &Caster<'_>,
         (path, current): (&FullPath, &Found),
-        ways: Ways,
+        (mixture, ways): (&Mixture, Ways),
         stream: &mut Stream,
     ) -> Option<f64> {
         self.old.follow(path).then_some(())?;
@@ -167,48 +141,61 @@ impl PathSpace {
         let weight = self.target.weight(&self.densities, current.technique);
         let alone = current.luminance / (self.target.count(&self.old) * weight);
         let Self { old, densities, mutations, walked, .. } = self;
-        let density = density(scene, (*mutations, ways), old, densities, walked);
-        let mut rounds = || density.rounds(scene, old, stream);
-        // Of a path that is there already, many rounds are more likely.
-        let rounds = if density.sought > 0.0 { rounds()? + rounds()? - 1 } else { 1 };
-        let worth = alone * f64::from(rounds) / (density.sure + density.sought);
-        (rounds < MOST_ROUNDS && worth.is_finite() && worth > 0.0).then_some(worth)
+        let density = density(scene, *mutations, (mixture, ways), old, densities, walked);
+        let rounds = density.rounds(|| density.trial(scene, old, &mixture.seeds, stream), true)?;
+        let worth = alone * rounds / (density.sure + density.sought);
+        (worth.is_finite() && worth > 0.0).then_some(worth)
     }
 }
 
 impl Density {
+    /// The mean of K over [`TRIALS`], each of which `trial` makes, of a path that is drawn or of one that is `there` already;
+    /// `None` where one is too large.
+    fn rounds(&self, mut trial: impl FnMut() -> Option<u32>, there: bool) -> Option<f64> {
+        if self.sought == 0.0 {
+            return Some(1.0);
+        }
+        let mut rounds = 0;
+        for number in 0..TRIALS {
+            // Of a path that is there, many rounds are more likely.
+            let more = if there && number == 0 { trial()? - 1 } else { 0 };
+            rounds += Some(trial()? + more).filter(|rounds| *rounds < MOST_ROUNDS)?;
+        }
+        Some(f64::from(rounds) / f64::from(TRIALS))
+    }
+
     /// K; `None` where it is too large.
-    fn rounds(&self, scene: &Caster<'_>, course: &Course, stream: &mut Stream) -> Option<u32> {
+    fn trial(&self, scene: &Caster<'_>, course: &Course, seeds: &Seeds, stream: &mut Stream) -> Option<u32> {
         let heads = self.sought / (self.sure + self.sought);
-        let found = |stream: &mut Stream| self.hidden.is_some_and(|d| connection::finds(scene, course, d, stream));
+        let found =
+            |stream: &mut Stream| self.hidden.is_some_and(|d| connection::finds(scene, course, d, seeds, stream));
         let ends = |stream: &mut Stream| stream.number() >= heads || found(stream);
-        (1..MOST_ROUNDS).find(|_| heads == 0.0 || ends(stream))
+        (1..MOST_ROUNDS).find(|_| ends(stream))
     }
 }
 
 /// q of a course, in units of the density of the technique that `densities` are relative to.
 fn density(
     scene: &Caster<'_>,
-    (mutations, ways): (PathMutations, Ways),
+    mutations: PathMutations,
+    (mixture, ways): (&Mixture, Ways),
     course: &mut Course,
     densities: &[f64],
     memory: &mut FullPath,
 ) -> Density {
-    let edges = course.edges();
-    let [linked, sought] = mutations.shares(scene, edges, ways);
-    let by_techniques = (1.0 - linked - sought) * densities.iter().sum::<f64>() / (edges + 1) as f64;
-    let mut density = Density { sure: by_techniques, sought: 0.0, hidden: None };
+    let mut density = Density { sure: mixture.by_techniques(ways, densities), sought: 0.0, hidden: None };
     let shines = matches!(course.nodes[0].kind, VertexKind::Light(_, Start::Surface { .. }));
-    let Some(d) = connection::joint(course).filter(|_| linked > 0.0 && shines) else { return density };
-    let of_link = |share: f64| share / (edges - 2) as f64 * densities[0];
+    let Some(d) = connection::joint(course).filter(|_| mixture.links() && shines) else { return density };
     let view = View { scene, technique: 0, mutations };
     let straight = connection::share(&view, course, d, memory);
-    density.sure += of_link(linked) * straight;
-    if straight == 0.0 {
-        density.hidden = Some(d);
-        if sought > 0.0 {
-            density.sought = of_link(sought) * connection::reach(scene, course, d, memory).unwrap_or(0.0);
-        }
+    if straight > 0.0 {
+        density.sure += mixture.of_link(ways, d) * densities[0] * straight;
+        return density;
+    }
+    density.hidden = Some(d);
+    if ways == Ways::All {
+        let reach = connection::reach(scene, course, d, memory).unwrap_or(0.0);
+        density.sought = mixture.of_seed(ways, d) * densities[0] * reach;
     }
     density
 }

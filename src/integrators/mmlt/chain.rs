@@ -29,8 +29,9 @@ pub(super) struct Chain {
     pub weight: f64,
     /// The path of `current`, as the technique that it came by has found it.
     pub path: FullPath,
-    /// What the path would be worth if it were drawn as independent ones are, once that has been asked.
-    pub drawn: Option<f64>,
+    /// What the path would be worth if it were drawn as independent ones are, by their ways, once that has been asked: its
+    /// rounds are a part of the chain's state.
+    pub drawn: [Option<f64>; 2],
     /// By kind, proposals and accepted ones. Technique changes of `mmlt` are among its small steps too.
     pub tallies: [[u64; 2]; KINDS],
     /// Jumps for which no rows could be found.
@@ -42,7 +43,7 @@ pub(super) struct Chain {
 impl Chain {
     pub(super) fn new(state: ChainState, stream: Stream, current: Found, path: FullPath) -> Self {
         let (tallies, rejections) = (Default::default(), BTreeMap::new());
-        Self { state, stream, current, weight: 0.0, path, drawn: None, tallies, failed: 0, rejections }
+        Self { state, stream, current, weight: 0.0, path, drawn: [None; 2], tallies, failed: 0, rejections }
     }
 
     /// Counts a mutation in path space that came to nothing.

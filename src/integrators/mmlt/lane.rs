@@ -2,13 +2,13 @@
 
 use super::super::chains::Light;
 use super::chain::{CHANGE, Chain, KINDS, LARGE, SMALL};
-use super::{Family, Share};
+use super::{Family, Share, links};
 use crate::film::{Health, Kernel, Splats};
 use crate::markov::{
     ChainState, ControlledMemory, Jump, JumpMemory, Jumps, Mutations, Tracer, Tries, controlled_step, jump,
 };
 use crate::math::Stream;
-use crate::path_space::{Gain, PathSpace, Target, Ways, way};
+use crate::path_space::{Gain, Mixture, PathSpace, Target, Ways, way};
 use crate::paths::{Found, FullPath};
 use crate::scene::{Caster, Scene};
 
@@ -51,6 +51,7 @@ pub(super) struct Lane {
 pub(super) struct Work<'a> {
     pub scene: &'a Caster<'a>,
     pub tracer: Tracer,
+    pub mixture: &'a Mixture,
     kernel: &'a Kernel,
     splats: &'a mut Splats,
     /// What one mutation adds.
@@ -109,10 +110,10 @@ impl Lane {
         let (caster, mut splats) = (Caster::new(scene), Splats::new(size));
         let mut chains = std::mem::take(&mut self.chains);
         let run = |(chain, share): (&mut Option<Chain>, &Share)| {
-            let Share { tracer, worth, mutations, weights } = *share;
+            let Share { tracer, worth, mutations, weights, ref mixture } = *share;
             self.path_space.weights = weights;
             let (scene, splats) = (&caster, &mut splats);
-            let mut work = Work { scene, tracer, kernel, splats, worth, large_steps: Light::default() };
+            let mut work = Work { scene, tracer, mixture, kernel, splats, worth, large_steps: Light::default() };
             if let Some(chain) = chain {
                 for _ in 0..own(mutations) {
                     self.mutate(chain, &mut work);
@@ -132,14 +133,14 @@ impl Lane {
         scene: &Scene,
         kernel: &Kernel,
         size: [usize; 2],
-        (index, tracer): (usize, Tracer),
+        (index, tracer, mixture): (usize, Tracer, &Mixture),
         (mutations, stream): (u64, Stream),
     ) -> Pilot {
         let Some(chain) = &self.chains[index] else { return Pilot::default() };
         let mut chain = Chain { stream, ..chain.clone() };
         let (caster, mut splats) = (Caster::new(scene), Splats::new(size));
         let (scene, splats) = (&caster, &mut splats);
-        let mut work = Work { scene, tracer, kernel, splats, worth: 0.0, large_steps: Light::default() };
+        let mut work = Work { scene, tracer, mixture, kernel, splats, worth: 0.0, large_steps: Light::default() };
         self.pilot = Some(Pilot::default());
         for _ in 0..mutations {
             self.mutate(&mut chain, &mut work);
@@ -155,7 +156,7 @@ impl Lane {
         if kind < large {
             return if self.mutations.tries(work.tracer.edges) {
                 self.try_all(chain, work);
-            } else if self.links(work.scene) {
+            } else if links(work.scene, self.family, &self.mutations) {
                 self.independent_step(chain, work);
             } else {
                 self.large_step(chain, work);
@@ -272,7 +273,7 @@ impl Lane {
         };
         if accepted {
             work.splat(&chain.current, std::mem::replace(&mut chain.weight, acceptance));
-            (chain.current, chain.drawn) = (*found, None);
+            (chain.current, chain.drawn) = (*found, [None; 2]);
             chain.state.accept();
             std::mem::swap(&mut chain.path, &mut self.proposal);
         } else {

@@ -19,7 +19,7 @@ use super::{Acceptance, ChainReport, Counts, path::Path, render::Settings};
 use crate::film::{Film, Kernel, Splats};
 use crate::markov::{ChainState, Mutations, Scales, Tracer};
 use crate::math::{Stream, Walk};
-use crate::path_space::{Gain, Ways, Weights};
+use crate::path_space::{Gain, Mixture, Seeds, Ways, Weights};
 use crate::paths::Open;
 use crate::scene::{Caster, Scene};
 use lane::{Job, Lane};
@@ -47,6 +47,8 @@ struct Length {
     worth: Worth,
     /// How often each mutation in path space is drawn.
     weights: Weights,
+    /// How independent paths in path space are drawn.
+    mixture: Arc<Mixture>,
 }
 
 /// What a pass does with one length.
@@ -58,6 +60,8 @@ struct Share {
     worth: f64,
     /// How often each mutation in path space is drawn.
     weights: Weights,
+    /// How independent paths in path space are drawn.
+    mixture: Arc<Mixture>,
 }
 
 /// The method with its chains.
@@ -76,12 +80,16 @@ impl Mmlt {
         let mutations = settings.mutations;
         let direct = mutations.traced_edges();
         let (size, open) = (scene.camera.size, Open::of(scene));
+        let links = links(scene, family, &mutations);
+        let seeds = Arc::new(if links { Seeds::seen(scene, settings.seed) } else { Seeds::default() });
         let lengths: Vec<Length> = (direct + 1..=settings.max_depth)
             .map(|edges| {
                 let tracer = Tracer { edges };
                 let scales = scales(tracer, &mutations, size, open);
                 let weights = Weights::even(mutations.path_space.kinds);
-                Length { tracer, scales, light: Light::default(), batches: 0, worth: Worth::default(), weights }
+                let (light, worth) = (Light::default(), Worth::default());
+                let mixture = Arc::new(Mixture::even(scene, &mutations.path_space, edges, seeds.clone()));
+                Length { tracer, scales, light, batches: 0, worth, weights, mixture }
             })
             .collect();
         Self {
@@ -95,35 +103,47 @@ impl Mmlt {
         }
     }
 
-    /// Draws a batch of independent samples of a length in which no light has been found; starts its chains where one
-    /// finds some, and finds out how its paths had better move.
+    /// Draws independent samples of a length in which no light has been found; starts its chains where one finds some, and
+    /// finds out how its paths had better move.
     fn explore(&mut self, scene: &Scene, kernel: &Kernel, index: usize) {
-        let count = self.lengths.len();
-        let length = &mut self.lengths[index];
-        let (tracer, batches, edges) = (length.tracer, length.batches, length.tracer.edges as u64);
-        let key = |sample: usize| [2, edges, batches, sample as u64];
-        let state = ChainState::new(self.mutations.small_step, length.scales.clone());
-        let samples = batch_samples(self.size, batches).div_ceil(count);
-        let memory = || (Lane::new(self.family, self.mutations, 0), state.clone());
-        let targets = independent(scene, samples, memory, |caster, (lane, state), sample| {
-            let mut stream = Stream::new(self.seed, &key(sample));
-            if lane.links(caster) {
-                let drawn = lane.draw(caster, (tracer, Ways::All), &mut stream);
-                return drawn.map_or((0.0, false), |drawn| (drawn.worth, drawn.hidden));
-            }
-            state.reset();
-            (lane.find(caster, tracer, state, &mut stream).map_or(0.0, |found| found.luminance), false)
-        });
-        length.batches += 1;
-        targets.iter().for_each(|target| length.light.add(*target, Ways::All));
-        let (caster, targets) = (Caster::new(scene), targets.into_iter().map(|(target, _)| target).collect::<Vec<_>>());
-        for (lane, (chosen, stream)) in self.lanes.iter_mut().zip(starts(&targets, self.seed, edges)) {
-            let draws = Stream::new(self.seed, &key(chosen));
-            lane.chains[index] = lane.start(&caster, tracer, state.clone(), draws, stream);
+        let samples = batch_samples(self.size, self.lengths[index].batches).div_ceil(self.lengths.len());
+        // What the first of two batches finds tells how the second is drawn.
+        for _ in 0..if links(scene, self.family, &self.mutations) { 2 } else { 1 } {
+            self.begin(scene, index, samples);
         }
         if self.family == Family::Fused && self.mutations.path_step > 0.0 {
             self.adapt(scene, kernel, index);
         }
+    }
+
+    /// Draws a batch of independent samples, where the chains of a length begin.
+    fn begin(&mut self, scene: &Scene, index: usize, samples: usize) {
+        let length = &mut self.lengths[index];
+        let (tracer, batches, edges) = (length.tracer, length.batches, length.tracer.edges as u64);
+        let key = |sample: usize| [2, edges, batches, sample as u64];
+        let state = ChainState::new(self.mutations.small_step, length.scales.clone());
+        let memory = || (Lane::new(self.family, self.mutations, 0), state.clone());
+        let mixture = &*length.mixture;
+        let targets = independent(scene, samples, memory, |caster, (lane, state), sample| {
+            let mut stream = Stream::new(self.seed, &key(sample));
+            if links(caster, self.family, &self.mutations) {
+                let drawn = lane.draw(caster, tracer, (mixture, Ways::All), &mut stream);
+                return (drawn.map_or(0.0, |drawn| drawn.worth), drawn);
+            }
+            state.reset();
+            (lane.find(caster, tracer, state, &mut stream).map_or(0.0, |found| found.luminance), None)
+        });
+        length.batches += 1;
+        for (target, drawn) in &targets {
+            length.light.add((*target, drawn.is_some_and(|drawn| drawn.hidden)), Ways::All);
+        }
+        let caster = Caster::new(scene);
+        let luminances: Vec<f64> = targets.iter().map(|(target, ..)| *target).collect();
+        for (lane, (chosen, stream)) in self.lanes.iter_mut().zip(starts(&luminances, self.seed, edges)) {
+            let draws = Stream::new(self.seed, &key(chosen));
+            lane.chains[index] = lane.start(&caster, (tracer, mixture), state.clone(), draws, stream);
+        }
+        length.mixture = Arc::new(mixture.adapted(targets.iter().filter_map(|(_, drawn)| drawn.as_ref())));
     }
 
     /// Finds how often paths had better move how, by a run whose chains are thrown away.
@@ -131,10 +151,10 @@ impl Mmlt {
         let (seed, size, kinds) = (self.seed, self.size, self.mutations.path_space.kinds);
         let mutations = (batch_samples(size, 0) / (self.lengths.len() * LANES)) as u64;
         let length = &mut self.lengths[index];
-        let tracer = length.tracer;
+        let (tracer, mixture) = (length.tracer, &*length.mixture);
         let run = |(number, lane): (usize, &mut Lane)| {
             let stream = Stream::new(seed, &[5, tracer.edges as u64, number as u64]);
-            lane.pilot(scene, kernel, size, (index, tracer), (mutations, stream)).gains
+            lane.pilot(scene, kernel, size, (index, tracer, mixture), (mutations, stream)).gains
         };
         let runs: Vec<_> = self.lanes.par_iter_mut().enumerate().map(run).collect();
         let mut gains = [Gain::default(); chain::KINDS];
@@ -145,14 +165,17 @@ impl Mmlt {
         length.weights = Weights::of(kinds, &path);
     }
 
-    /// How a pass divides one mutation per pixel among the lengths: in proportion to their light.
+    /// How a pass divides one mutation per pixel among the lengths: in proportion to their light, or to what is due to it.
     fn plan(&mut self, pixels: f64) -> Vec<Share> {
-        let total: f64 = self.lengths.iter().map(|length| length.light.mean()).sum();
+        let fused = self.family == Family::Fused;
+        let due = |length: &Length| if fused { length.light.due() } else { length.light.mean() };
+        let total: f64 = self.lengths.iter().map(due).sum();
         let part = |length: &mut Length| {
             let b = length.light.mean();
-            let mutations = if b > 0.0 { (b / total * pixels).ceil() } else { 0.0 };
+            let mutations = if b > 0.0 { (due(length) / total * pixels).ceil() } else { 0.0 };
             let worth = length.worth.next(b) * pixels / mutations.max(1.0);
-            Share { tracer: length.tracer, mutations: mutations as u64, worth, weights: length.weights }
+            let Length { tracer, weights, ref mixture, .. } = *length;
+            Share { tracer, mutations: mutations as u64, worth, weights, mixture: mixture.clone() }
         };
         self.lengths.iter_mut().map(part).collect()
     }
@@ -211,6 +234,11 @@ impl Mmlt {
             *counts.rejections.entry(cause).or_default() += count;
         }
     }
+}
+
+/// Whether independent paths come about by connections over manifolds as well.
+fn links(scene: &Scene, family: Family, mutations: &Mutations) -> bool {
+    family == Family::Fused && mutations.path_space.links(scene)
 }
 
 /// How far the numbers of each row of a state move.

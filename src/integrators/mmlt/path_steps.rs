@@ -1,49 +1,42 @@
 //! What chains do in path space: mutations there, and independent paths that more than techniques find.
 
-use super::Family;
 use super::chain::{Chain, LARGE, PRIMARY};
 use super::lane::{Lane, Work};
+use super::links;
 use crate::markov::{ChainState, Tracer, retell};
 use crate::math::Stream;
-use crate::path_space::{Drawn, Proposed, Ways};
+use crate::path_space::{Drawn, Mixture, Proposed, Ways};
 use crate::paths::{Found, FullPath};
 use crate::scene::Caster;
-
-/// The share of independent paths in a chain that are drawn in all ways.
-const SEEKING: f64 = 0.05;
 
 /// How far the target may be off, relative to itself, after the way to rows and back.
 const ROUND_TRIP: f64 = 1e-6;
 
 impl Lane {
-    /// Whether independent paths come about by connections over manifolds as well.
-    pub(super) fn links(&self, scene: &Caster<'_>) -> bool {
-        self.family == Family::Fused && self.mutations.path_space.links(scene)
-    }
-
     /// An independent path.
     pub(super) fn draw(
         &mut self,
         scene: &Caster<'_>,
-        (tracer, ways): (Tracer, Ways),
+        tracer: Tracer,
+        ways: (&Mixture, Ways),
         stream: &mut Stream,
     ) -> Option<Drawn> {
         let Self { path_space, proposal, health, .. } = self;
-        let by_technique = |stream: &mut Stream, path: &mut FullPath| tracer.sample(scene, stream, path, health);
-        path_space.sample(scene, (tracer.edges, ways), stream, proposal, by_technique)
+        let by_technique = |s, stream: &mut Stream, path: &mut FullPath| tracer.sample(scene, s, stream, path, health);
+        path_space.sample(scene, ways, stream, proposal, by_technique)
     }
 
     /// A chain that begins at the independent path that `draws` gives; `None` where its rows cannot be found.
     pub(super) fn start(
         &mut self,
         scene: &Caster<'_>,
-        tracer: Tracer,
+        (tracer, mixture): (Tracer, &Mixture),
         mut state: ChainState,
         mut draws: Stream,
         mut stream: Stream,
     ) -> Option<Chain> {
-        let found = if self.links(scene) {
-            let Drawn { found, .. } = self.draw(scene, (tracer, Ways::All), &mut draws)?;
+        let found = if links(scene, self.family, &self.mutations) {
+            let Drawn { found, .. } = self.draw(scene, tracer, (mixture, Ways::All), &mut draws)?;
             self.confirm(scene, tracer, found, None, &mut state, &mut stream).ok()?
         } else {
             self.find(scene, tracer, &mut state, &mut draws)?
@@ -69,18 +62,15 @@ impl Lane {
     pub(super) fn independent_step(&mut self, chain: &mut Chain, work: &mut Work<'_>) {
         let Chain { stream, path, current, drawn: known, .. } = chain;
         // What a hidden path is worth takes long to tell.
-        let ways = if stream.number() < SEEKING { Ways::All } else { Ways::Known };
-        let drawn = self.draw(work.scene, (work.tracer, ways), stream);
+        let ways = if stream.number() < work.mixture.seeking() { Ways::All } else { Ways::Known };
+        let drawn = self.draw(work.scene, work.tracer, (work.mixture, ways), stream);
         work.large_steps.add(drawn.map_or((0.0, false), |drawn| (drawn.worth, drawn.hidden)), ways);
         let proposal = drawn.and_then(|Drawn { found, worth, .. }| {
-            let mut ask = || self.path_space.worth(work.scene, (path, current), ways, stream);
-            let before = match ways {
-                Ways::Known => {
-                    *known = known.or_else(ask);
-                    (*known)?
-                }
-                Ways::All => ask()?,
-            };
+            let before = &mut known[ways as usize];
+            if before.is_none() {
+                *before = self.path_space.worth(work.scene, (path, current), (work.mixture, ways), stream);
+            }
+            let before = (*before)?;
             Some((found, worth / before))
         });
         self.move_path(chain, LARGE, proposal, work);
