@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{build, glass, pinhole};
+use common::{build, diffuse, glass, pinhole};
 use glam::{DMat2, DVec2, DVec3, Vec3};
 use pathblend::bsdf::{Bsdf, Conductor};
 use pathblend::geometry::Solid;
@@ -295,6 +295,30 @@ fn flat_surfaces_have_the_textbook_solution() {
     }
     let bent = start * DVec3::new(1.0, 1.0, 0.0) + across * low;
     assert!((walk(glass(1.33), DVec3::new(0.1, 0.3, 0.0), below) - bent).length() < 1e-9);
+}
+
+/// A vertex may lie close to a boundary: the ray that sets out from it, off its surface, meets what it is aimed at.
+#[test]
+fn walks_set_out_from_next_to_a_boundary() {
+    const GAP: f64 = 1e-3;
+    let scene = scene(|builder| {
+        let [water, floor] = [glass(1.33), diffuse(0.5)].map(|bsdf| builder.bsdf(bsdf));
+        for (height, bsdf) in [(0.0, water), (-GAP, floor)] {
+            builder.solid(Solid::disk(DVec3::Z * height, DVec3::Z, 3.0), bsdf, None).unwrap();
+        }
+    });
+    let scene = Caster::new(&scene);
+    let floor = scene.intersect(Origin::from(DVec3::new(-0.4, 0.1, -0.5 * GAP)), -DVec3::Z).unwrap();
+    let start = Node::on(floor, false);
+    for tangent in 1..=20 {
+        let direction = DVec3::new(0.05 * f64::from(tangent), 0.0, 1.0).normalize();
+        let water = scene.intersect(start.leave(direction), direction).unwrap();
+        let onward = Turn::at(&scene, &water, -direction, direction).unwrap();
+        let goal = water.position + onward.onward(water.frame.normal, -direction).unwrap() * 3.0;
+        let chain = Chain::new(&scene, start.position, &deltas(&[water]), goal).unwrap();
+        let aim = Goal::new(goal + DVec3::new(0.1, -0.2, 0.0), [DVec3::X, DVec3::Y]);
+        assert!(chain.walk(&scene, &start, &aim).is_ok(), "{tangent}");
+    }
 }
 
 /// Seen in a flat mirror a light is as far away as its image; seen through water, light of all azimuths tells how narrow the

@@ -1,23 +1,23 @@
 //! How often independent paths come about in which way.
 //!
-//! Before a scene is seen, all techniques are as likely, a quarter of the paths are linked, with d drawn evenly, and where
-//! hidden light is sought another quarter by random seeds. The light that first samples have found tells more. If each way is as likely as its paths have light,
-//! its share of E[f/q], the mixture is nearer to f than before (a step of expectation maximisation, as Douc et al. 2007 have
-//! it for adaptive importance sampling). Half of all paths come about as if nothing were known, so that no light that first
-//! samples have missed is worth more than twice as much as it would be otherwise.
+//! Before a scene is seen, all techniques are as likely. Where there are smooth boundaries, a quarter of the paths are linked,
+//! and where hidden light is sought a quarter by random seeds, with d drawn evenly. The light that first samples have found
+//! tells more. If each way is as likely as its paths have light, its share of E[f/q], the mixture is nearer to f than before
+//! (a step of expectation maximisation; Douc et al. 2007, "Convergence of adaptive mixtures of importance sampling schemes").
+//! Half of all paths come about as if nothing were known, so that no light that first samples have missed is worth more than
+//! twice as much as it would be otherwise.
 
 use super::{Drawn, Kind, PathMutations, Seeds};
 use crate::math::pick;
 use crate::scene::Scene;
 use std::sync::Arc;
 
-/// The share of paths that are linked with a light, where there are smooth boundaries at all, and the share of those that a
-/// random seed links.
+/// The share of paths whose way is known that are linked with a light.
 const LINKED: f64 = 0.25;
+/// The share of paths that a random seed links with a light.
 const SOUGHT: f64 = 0.25;
 /// The share of paths that come about as if nothing were known.
 const KEPT: f64 = 0.5;
-
 /// Bounds of the share of large steps in which hidden light is sought.
 const SEEKING: [f64; 2] = [0.1, 0.75];
 
@@ -97,8 +97,8 @@ impl Mixture {
         self.shares.len() > self.edges + 1
     }
 
-    /// The share of large steps in which hidden light is sought. Two kinds of light that vary as much, each relative to its
-    /// mean, had better be sampled in proportion to these; but that which is found seldom varies more.
+    /// The share of large steps in which hidden light is sought: the root of its share of all light. In proportion to their
+    /// means one would sample two kinds of light that vary as much; but what is found seldom varies more.
     pub fn seeking(&self) -> f64 {
         let [least, most] = SEEKING;
         self.hidden.sqrt().clamp(least, most)
@@ -149,5 +149,66 @@ impl PathMutations {
     /// Whether independent paths come about in more ways than the techniques have.
     pub fn links(&self, scene: &Scene) -> bool {
         self.kinds.has(Kind::Connection) && scene.refracts()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::PathClass;
+    use crate::paths::Found;
+    use crate::spectrum::Spectrum;
+    use glam::DVec2;
+
+    const EDGES: usize = 5;
+
+    /// Of paths that are linked, with shares that all differ.
+    fn mixture() -> Mixture {
+        let shares: Vec<f64> = (1..=EDGES + 1 + 2 * (EDGES - 2)).map(|place| place as f64 / 78.0).collect();
+        let even = shares.clone().into();
+        let sought = shares[EDGES + 1 + EDGES - 2..].iter().sum();
+        Mixture { shares, even, sought, hidden: 0.0, edges: EDGES, seeds: Arc::default() }
+    }
+
+    #[test]
+    fn ways_are_drawn_by_their_shares() {
+        const DRAWS: u32 = 78_000;
+        for ways in [Ways::Known, Ways::All] {
+            let mixture = mixture();
+            let drawn = |way: Way| {
+                let number = |i: u32| (f64::from(i) + 0.5) / f64::from(DRAWS);
+                (0..DRAWS).filter(|i| mixture.draw(ways, number(*i)) == way).count() as f64 / f64::from(DRAWS)
+            };
+            let mut total = 0.0;
+            let mut same = |way: Way, share: f64| {
+                assert!((drawn(way) - share).abs() < 1e-4, "{ways:?}, {way:?}: {} for {share}", drawn(way));
+                total += share;
+            };
+            for s in 0..=EDGES {
+                let alone: Vec<f64> = (0..=EDGES).map(|other| f64::from(u8::from(other == s))).collect();
+                same(Way::Technique(s), mixture.by_techniques(ways, &alone));
+            }
+            for d in 2..EDGES {
+                same(Way::Link(d), mixture.of_link(ways, d));
+                same(Way::Seek(d), mixture.of_seed(ways, d));
+            }
+            assert!((total - 1.0).abs() < 1e-12, "{total}");
+        }
+    }
+
+    #[test]
+    fn half_of_the_paths_follow_the_light() {
+        let (before, way) = (mixture(), Way::Seek(3));
+        let (value, class, film) = (Spectrum::ONE, PathClass::LONGER, DVec2::ZERO);
+        let found = Found { value, luminance: 1.0, class, film, technique: 0 };
+        let drawn = Drawn { found, worth: 2.0, way, hidden: true };
+        let after = before.adapted([drawn, drawn].iter()).adapted([drawn].iter());
+        for (place, (before, after)) in before.shares.iter().zip(&after.shares).enumerate() {
+            let light = if place == mixture().place(way) { 0.5 } else { 0.0 };
+            assert!((after - 0.5 * before - light).abs() < 1e-12, "{place}");
+        }
+        assert_eq!(after.seeking(), SEEKING[1]);
+        assert!((after.shares.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        assert_eq!(before.adapted([].iter()).shares, before.shares);
     }
 }

@@ -139,3 +139,35 @@ fn follow(scene: &Caster<'_>, stream: &Stream, path: &mut Subpath) -> Option<See
     let ends = links <= MOST_LINKS && end.connects && end.surface().is_some();
     ends.then(|| bends.collect::<Option<_>>())?.map(|bends| Seen { end: end.position, bends })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Chains of two links that end along a line, most of them at its far end.
+    fn chains(count: usize) -> Vec<Seen> {
+        let bend = |x: f64| Bend { position: DVec3::X * x, normal: DVec3::Z, reflected: x < 0.5 };
+        let at = |i: usize| 1.0 - (i as f64 / count as f64).powi(2);
+        (0..count).map(|i| Seen { end: DVec3::X * at(i), bends: (0..2).map(|_| bend(at(i))).collect() }).collect()
+    }
+
+    #[test]
+    fn chains_that_end_nearby_are_drawn_first() {
+        const DRAWS: usize = 2000;
+        let mut seeds = Seeds { groups: vec![Group::default(); MOST_LINKS + 1] };
+        seeds.groups[2] = Group::new(chains(1000), 10.0);
+        let mut stream = Stream::new(1, &[]);
+        for end in [0.2, 0.6, 0.99] {
+            let drawn = || seeds.draw(2, DVec3::X * end, &mut stream).map(|bends| (bends.len(), bends[0].position.x));
+            let near = std::iter::repeat_with(drawn).take(DRAWS).flatten().filter(|(links, x)| {
+                assert_eq!(*links, 2);
+                (x - end).abs() <= seeds.groups[2].width
+            });
+            let share = near.count() as f64 / DRAWS as f64;
+            assert!(share > NEARBY - 0.05, "{end}: {share}");
+        }
+        assert!(seeds.draw(2, DVec3::Y * 9.0, &mut stream).is_some(), "where none ends, any will do");
+        assert!(seeds.draw(3, DVec3::X, &mut stream).is_none());
+        assert!(Seeds::default().draw(1, DVec3::X, &mut stream).is_none());
+    }
+}

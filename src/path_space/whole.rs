@@ -7,8 +7,9 @@
 //! q(x) = Σ_s α_s p_s(x) + λ_d m_d(x),
 //! ```
 //!
-//! where d is the first free vertex from the light, and α and λ are those of a [`Mixture`]. f/q is what a path is worth: its mean is b, and the acceptance of an
-//! independent path is the ratio of both paths' worth, where the technique is then drawn by the weights w_s, as jumps do.
+//! where d is the first free vertex from the light, and α and λ are those of a [`Mixture`]. f/q is what a path is worth: its
+//! mean is b, and the acceptance of an independent path is the ratio of both paths' worth, where the technique is then drawn
+//! by the weights w_s, as jumps do.
 //!
 //! # Hidden light
 //! The seed of a link sets out straight for the light and is refracted. Where another chain leads there too, one that is
@@ -28,8 +29,9 @@
 //! As a large step it is exact as well. Take K into the state, with the target f σ K P(K | σ), whose sum over K is f. A path
 //! that is drawn comes with the density q P(K | σ), so the ratio of target and density is f K/(A + B), again what it is
 //! worth. A path that has come by another mutation draws its K anew, from K P(K | σ) σ: that is the law of K₁ + K₂ − 1 for
-//! two geometric numbers. More than [`MOST_ROUNDS`] end in a rejection, for both ways alike; only b misses such paths. The mean
-//! of some such numbers stands for K, so that it varies less: of those of a path that is there, one has the other law.
+//! two geometric numbers. More than [`MOST_ROUNDS`] end in a rejection, for both ways alike; only b misses such paths.
+//! The mean of [`TRIALS`] such numbers stands for K, so that it varies less: of those of a path that has come by another
+//! mutation, one has that law, the others the geometric one.
 
 use super::connection::Seed;
 use super::mixture::{Mixture, Way, Ways};
