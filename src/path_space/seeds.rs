@@ -15,12 +15,12 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// Walks from the lights.
+/// The most walks from the lights, in rounds of some jobs.
 const WALKS: u64 = 1 << 17;
-/// In so many jobs.
-const JOBS: u64 = 64;
-/// The most chains of one length.
-const MOST: usize = 10_000;
+const ROUNDS: u64 = 16;
+const JOBS: u64 = 16;
+/// No further round is wanted once there are so many chains.
+const ENOUGH: usize = 10_000;
 /// Share of the chains that are drawn from those that end nearby.
 const NEARBY: f64 = 0.75;
 /// How many those are, on the average of all chains.
@@ -64,19 +64,22 @@ pub struct Seeds {
 impl Seeds {
     /// As walks from the lights find them.
     pub fn seen(scene: &Scene, seed: u64) -> Self {
+        const LENGTH: u64 = WALKS / ROUNDS / JOBS;
         let job = |job: u64| {
             let (caster, mut path) = (Caster::new(scene), Subpath::default());
-            let walks = job * WALKS / JOBS..(job + 1) * WALKS / JOBS;
+            let walks = job * LENGTH..(job + 1) * LENGTH;
             walks.filter_map(|walk| follow(&caster, &Stream::new(seed, &[6, walk]), &mut path)).collect()
         };
-        let jobs: Vec<Vec<Seen>> = (0..JOBS).into_par_iter().map(job).collect();
-        let mut by_links = vec![Vec::new(); MOST_LINKS + 1];
-        for chain in jobs.into_iter().flatten() {
-            let group = &mut by_links[chain.bends.len()];
-            if group.len() < MOST {
-                group.push(chain);
+        let mut chains = Vec::new();
+        for round in 0..ROUNDS {
+            let jobs: Vec<Vec<Seen>> = (round * JOBS..(round + 1) * JOBS).into_par_iter().map(job).collect();
+            chains.extend(jobs.into_iter().flatten());
+            if chains.len() >= ENOUGH {
+                break;
             }
         }
+        let mut by_links = vec![Vec::new(); MOST_LINKS + 1];
+        chains.into_iter().for_each(|chain| by_links[chain.bends.len()].push(chain));
         Self { groups: by_links.into_iter().map(|chains| Group::new(chains, scene.radius())).collect() }
     }
 
