@@ -15,10 +15,12 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// The most walks from the lights, in rounds of some jobs.
-const WALKS: u64 = 1 << 17;
-const ROUNDS: u64 = 16;
+/// Walks from the lights in a round, in so many jobs.
+const WALKS: u64 = 1 << 13;
 const JOBS: u64 = 16;
+/// A round for so many pixels, and the most rounds.
+const PIXELS: usize = 256;
+const ROUNDS: usize = 16;
 /// No further round is wanted once there are so many chains.
 const ENOUGH: usize = 10_000;
 /// Share of the chains that are drawn from those that end nearby.
@@ -64,14 +66,15 @@ pub struct Seeds {
 impl Seeds {
     /// As walks from the lights find them.
     pub fn seen(scene: &Scene, seed: u64) -> Self {
-        const LENGTH: u64 = WALKS / ROUNDS / JOBS;
+        const LENGTH: u64 = WALKS / JOBS;
+        let [width, height] = scene.camera.size;
         let job = |job: u64| {
             let (caster, mut path) = (Caster::new(scene), Subpath::default());
             let walks = job * LENGTH..(job + 1) * LENGTH;
             walks.filter_map(|walk| follow(&caster, &Stream::new(seed, &[6, walk]), &mut path)).collect()
         };
         let mut chains = Vec::new();
-        for round in 0..ROUNDS {
+        for round in 0..(width * height / PIXELS).clamp(1, ROUNDS) as u64 {
             let jobs: Vec<Vec<Seen>> = (round * JOBS..(round + 1) * JOBS).into_par_iter().map(job).collect();
             chains.extend(jobs.into_iter().flatten());
             if chains.len() >= ENOUGH {
