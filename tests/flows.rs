@@ -183,7 +183,7 @@ const SAMPLES: u64 = 5000;
 /// For paths of these lengths, what they are drawn by as long as nothing is known, and once something is.
 fn mixtures(scene: &Scene, lengths: Lengths) -> Vec<[Mixture; 2]> {
     let mutations = PathMutations::default();
-    let seeds = Arc::new(Seeds::seen(scene, 3));
+    let seeds = Arc::new(Seeds::seen(scene, &mutations, 3));
     let both = |edges: usize| {
         let even = Mixture::even(scene, &mutations, edges, seeds.clone());
         let (caster, mut path) = (Caster::new(scene), FullPath::default());

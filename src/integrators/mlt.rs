@@ -70,8 +70,7 @@ impl Mlt {
         let direct = settings.mutations.traced_edges();
         let lengths = Lengths { least: direct + 1, most: settings.max_depth };
         let (target, mutations) = (Target::Path(lengths), settings.mutations.path_space);
-        let links = mutations.links(scene);
-        let seeds = Arc::new(if links { Seeds::seen(scene, settings.seed) } else { Seeds::default() });
+        let seeds = Arc::new(Seeds::seen(scene, &mutations, settings.seed));
         let mixture = |edges| Mixture::even(scene, &mutations, edges, seeds.clone());
         Self {
             seed: settings.seed,

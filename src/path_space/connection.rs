@@ -142,9 +142,12 @@ fn random(
     let from = &course.nodes[d];
     let seen = if stream.number() < AS_SEEN { seeds.draw(d - 1, from.position, stream) } else { None };
     let mut own = ArrayVec::new();
-    let (tried, bends) = match seen {
-        Some(seen) => ((seen[0].position - from.position).try_normalize().ok_or(Rejection::Singular)?, seen),
-        None => (attempt(scene, (course, d), stream, &mut own)?, &*own),
+    let (tried, traced, bends) = match seen {
+        Some(seen) => ((seen[0].position - from.position).try_normalize().ok_or(Rejection::Singular)?, None, seen),
+        None => {
+            let (tried, way) = attempt(scene, (course, d), stream, &mut own)?;
+            (tried, Some(way), &*own)
+        }
     };
     let follow = |direction: DVec3| {
         let mut planned = bends.iter();
@@ -166,30 +169,30 @@ fn random(
             return way.settle(scene, from, light);
         }
     }
-    follow(tried)?.settle(scene, from, light)
+    traced.map_or_else(|| follow(tried), Ok)?.settle(scene, from, light)
 }
 
 /// Tries a way from x_d through smooth boundaries, at each of which it passes or is reflected by chance: where it sets out,
-/// and what it does.
+/// and where it leads. What it does is left in `bends`.
 fn attempt(
     scene: &Caster<'_>,
     (course, d): (&Course, usize),
     stream: &mut Stream,
     bends: &mut ArrayVec<Bend, MOST_LINKS>,
-) -> Result<DVec3, Rejection> {
+) -> Result<(DVec3, Way), Rejection> {
     let from = &course.nodes[d];
     let surface = from.surface().ok_or(Rejection::Unsuitable)?;
     let back = course.direction(scene, d).ok_or(Rejection::Singular)?;
     let scatter = scene.scatter(surface, surface.frame.to_local(back), stream.row(), Walk::FromCamera);
     let scatter = scatter.filter(|scatter| !scatter.delta).ok_or(Rejection::Unsuitable)?;
     let direction = surface.frame.to_world(scatter.direction);
-    Way::trace(scene, from, d - 1, direction, |surface, direction| {
+    let way = Way::trace(scene, from, d - 1, direction, |surface, direction| {
         let passed = if stream.number() < 0.5 { pass(scene, surface, direction) } else { None };
         let (position, normal) = (surface.position, surface.frame.normal);
         bends.try_push(Bend { position, normal, reflected: passed.is_none() }).ok()?;
         passed.or_else(|| reflect(surface, direction))
     })?;
-    Ok(direction)
+    Ok((direction, way))
 }
 
 /// Where light goes that a surface reflects.

@@ -45,6 +45,9 @@ impl Kind {
 pub struct Kinds([bool; Kind::ALL.len()]);
 
 impl Kinds {
+    /// Not any.
+    pub const NONE: Self = Self([false; Kind::ALL.len()]);
+
     /// Whether `kind` is one of them.
     pub const fn has(self, kind: Kind) -> bool {
         self.0[kind as usize]

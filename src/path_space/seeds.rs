@@ -4,6 +4,7 @@
 //! A chain that ends nearby is likely to be of the same kind. How likely a seed is to find a chain with them need not be
 //! known (see [`super::whole`]), so that any number of them will do, as long as they stay as they are.
 
+use super::PathMutations;
 use crate::manifold::MOST_LINKS;
 use crate::math::Stream;
 use crate::paths::{Random, Subpath, Vertex, trace_light};
@@ -64,8 +65,11 @@ pub struct Seeds {
 }
 
 impl Seeds {
-    /// As walks from the lights find them.
-    pub fn seen(scene: &Scene, seed: u64) -> Self {
+    /// As walks from the lights find them, where paths are linked with lights.
+    pub fn seen(scene: &Scene, mutations: &PathMutations, seed: u64) -> Self {
+        if !mutations.links(scene) {
+            return Self::default();
+        }
         const LENGTH: u64 = WALKS / JOBS;
         let [width, height] = scene.camera.size;
         let job = |job: u64| {

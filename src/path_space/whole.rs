@@ -85,8 +85,12 @@ impl PathSpace {
                 by_technique(s, stream, path)?;
                 self.new.follow(path).then_some(s)?
             }
-            Way::Link(d) => self.link(scene, (mixture.edges(), d), Seed::Straight, stream, path)?,
-            Way::Seek(d) => self.link(scene, (mixture.edges(), d), Seed::Random(&mixture.seeds), stream, path)?,
+            Way::Link(d) | Way::Seek(d) => {
+                let sought = matches!(way, Way::Seek(_));
+                let seed = if sought { Seed::Random(&mixture.seeds) } else { Seed::Straight };
+                self.link(scene, (mixture.edges(), d), seed, stream, path)?;
+                0
+            }
         };
         let alone = realise(scene, &mut self.new, technique, (&Techniques::ALONE, 1.0), path)?;
         path.densities(&mut self.densities);
@@ -96,7 +100,7 @@ impl PathSpace {
             // Not hidden, and so none of its kind.
             return None;
         }
-        let rounds = density.rounds(|| density.trial(scene, new, &mixture.seeds, stream), false)?;
+        let rounds = density.rounds((scene, new, &mixture.seeds), false, stream)?;
         let worth = alone.luminance * rounds / (density.sure + density.sought);
         let hidden = density.hidden.is_some();
         let found = match self.target.pick(&self.densities, stream) {
@@ -109,7 +113,7 @@ impl PathSpace {
         worth.is_finite().then_some(Drawn { found, worth, way, hidden })
     }
 
-    /// A path that is linked with a light, left in `self.new`, and its technique.
+    /// A path that is linked with a light, left in `self.new`.
     fn link(
         &mut self,
         scene: &Caster<'_>,
@@ -117,7 +121,7 @@ impl PathSpace {
         seed: Seed<'_>,
         stream: &mut Stream,
         path: &mut FullPath,
-    ) -> Option<usize> {
+    ) -> Option<()> {
         let (first, count) = (stream.row(), edges - d + 1);
         let film = scene.camera.film_position(first);
         trace_camera(scene, film, first, &mut Random(stream), count, usize::MAX, &mut path.camera);
@@ -126,8 +130,7 @@ impl PathSpace {
             return None;
         }
         self.old.begin(&path.camera, edges);
-        connection::connect(scene, &self.old, d, seed, stream, &mut self.new).ok()?;
-        Some(0)
+        connection::connect(scene, &self.old, d, seed, stream, &mut self.new).ok()
     }
 
     /// What `path`, which contributes `current` to a chain, would be worth if it were drawn.
@@ -144,19 +147,25 @@ impl PathSpace {
         let alone = current.luminance / (self.target.count(&self.old) * weight);
         let Self { old, densities, mutations, walked, .. } = self;
         let density = density(scene, *mutations, (mixture, ways), old, densities, walked);
-        let rounds = density.rounds(|| density.trial(scene, old, &mixture.seeds, stream), true)?;
+        let rounds = density.rounds((scene, old, &mixture.seeds), true, stream)?;
         let worth = alone * rounds / (density.sure + density.sought);
         (worth.is_finite() && worth > 0.0).then_some(worth)
     }
 }
 
 impl Density {
-    /// The mean of K over [`TRIALS`], each of which `trial` makes, of a path that is drawn or of one that is `there` already;
-    /// `None` where one is too large.
-    fn rounds(&self, mut trial: impl FnMut() -> Option<u32>, there: bool) -> Option<f64> {
-        if self.sought == 0.0 {
-            return Some(1.0);
-        }
+    /// The mean of K over [`TRIALS`], for a path that is drawn or for one that is `there` already; `None` where one is too large.
+    fn rounds(
+        &self,
+        (scene, course, seeds): (&Caster<'_>, &Course, &Seeds),
+        there: bool,
+        stream: &mut Stream,
+    ) -> Option<f64> {
+        let Some(d) = self.hidden.filter(|_| self.sought > 0.0) else { return Some(1.0) };
+        let heads = self.sought / (self.sure + self.sought);
+        let mut trial = || {
+            (1..MOST_ROUNDS).find(|_| stream.number() >= heads || connection::finds(scene, course, d, seeds, stream))
+        };
         let mut rounds = 0;
         for number in 0..TRIALS {
             // Of a path that is there, many rounds are more likely.
@@ -164,15 +173,6 @@ impl Density {
             rounds += Some(trial()? + more).filter(|rounds| *rounds < MOST_ROUNDS)?;
         }
         Some(f64::from(rounds) / f64::from(TRIALS))
-    }
-
-    /// K; `None` where it is too large.
-    fn trial(&self, scene: &Caster<'_>, course: &Course, seeds: &Seeds, stream: &mut Stream) -> Option<u32> {
-        let heads = self.sought / (self.sure + self.sought);
-        let found =
-            |stream: &mut Stream| self.hidden.is_some_and(|d| connection::finds(scene, course, d, seeds, stream));
-        let ends = |stream: &mut Stream| stream.number() >= heads || found(stream);
-        (1..MOST_ROUNDS).find(|_| ends(stream))
     }
 }
 

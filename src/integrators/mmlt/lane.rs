@@ -2,7 +2,7 @@
 
 use super::super::chains::Light;
 use super::chain::{CHANGE, Chain, KINDS, LARGE, SMALL};
-use super::{Family, Share, links};
+use super::{Family, Share};
 use crate::film::{Health, Kernel, Splats};
 use crate::markov::{
     ChainState, ControlledMemory, Jump, JumpMemory, Jumps, Mutations, Tracer, Tries, controlled_step, jump,
@@ -156,7 +156,7 @@ impl Lane {
         if kind < large {
             return if self.mutations.tries(work.tracer.edges) {
                 self.try_all(chain, work);
-            } else if links(work.scene, self.family, &self.mutations) {
+            } else if work.mixture.links() {
                 self.independent_step(chain, work);
             } else {
                 self.large_step(chain, work);

@@ -19,7 +19,7 @@ use super::{Acceptance, ChainReport, Counts, path::Path, render::Settings};
 use crate::film::{Film, Kernel, Splats};
 use crate::markov::{ChainState, Mutations, Scales, Tracer};
 use crate::math::{Stream, Walk};
-use crate::path_space::{Gain, Mixture, Seeds, Ways, Weights};
+use crate::path_space::{Gain, Kinds, Mixture, Seeds, Ways, Weights};
 use crate::paths::Open;
 use crate::scene::{Caster, Scene};
 use lane::{Job, Lane};
@@ -77,11 +77,13 @@ pub(super) struct Mmlt {
 
 impl Mmlt {
     pub(super) fn start(scene: &Scene, settings: &Settings, family: Family) -> Self {
-        let mutations = settings.mutations;
+        let mut mutations = settings.mutations;
+        if family != Family::Fused {
+            mutations.path_space.kinds = Kinds::NONE;
+        }
         let direct = mutations.traced_edges();
         let (size, open) = (scene.camera.size, Open::of(scene));
-        let links = links(scene, family, &mutations);
-        let seeds = Arc::new(if links { Seeds::seen(scene, settings.seed) } else { Seeds::default() });
+        let seeds = Arc::new(Seeds::seen(scene, &mutations.path_space, settings.seed));
         let lengths: Vec<Length> = (direct + 1..=settings.max_depth)
             .map(|edges| {
                 let tracer = Tracer { edges };
@@ -107,9 +109,11 @@ impl Mmlt {
     /// finds out how its paths had better move.
     fn explore(&mut self, scene: &Scene, kernel: &Kernel, index: usize) {
         let samples = batch_samples(self.size, self.lengths[index].batches).div_ceil(self.lengths.len());
-        // What the first of two batches finds tells how the second is drawn.
-        for _ in 0..if links(scene, self.family, &self.mutations) { 2 } else { 1 } {
-            self.begin(scene, index, samples);
+        // What the first of two batches finds tells how the second is drawn. Paths that may be linked take several times as
+        // long, so that there are fewer.
+        let batches: &[usize] = if self.lengths[index].mixture.links() { &[4, 2] } else { &[1] };
+        for part in batches {
+            self.begin(scene, index, samples.div_ceil(*part));
         }
         if self.family == Family::Fused && self.mutations.path_step > 0.0 {
             self.adapt(scene, kernel, index);
@@ -126,7 +130,7 @@ impl Mmlt {
         let mixture = &*length.mixture;
         let targets = independent(scene, samples, memory, |caster, (lane, state), sample| {
             let mut stream = Stream::new(self.seed, &key(sample));
-            if links(caster, self.family, &self.mutations) {
+            if mixture.links() {
                 let drawn = lane.draw(caster, tracer, (mixture, Ways::All), &mut stream);
                 return (drawn.map_or(0.0, |drawn| drawn.worth), drawn);
             }
@@ -149,7 +153,7 @@ impl Mmlt {
     /// Finds how often paths had better move how, by a run whose chains are thrown away.
     fn adapt(&mut self, scene: &Scene, kernel: &Kernel, index: usize) {
         let (seed, size, kinds) = (self.seed, self.size, self.mutations.path_space.kinds);
-        let mutations = (batch_samples(size, 0) / (self.lengths.len() * LANES)) as u64;
+        let mutations = (batch_samples(size, 0) / (2 * self.lengths.len() * LANES)) as u64;
         let length = &mut self.lengths[index];
         let (tracer, mixture) = (length.tracer, &*length.mixture);
         let run = |(number, lane): (usize, &mut Lane)| {
@@ -234,11 +238,6 @@ impl Mmlt {
             *counts.rejections.entry(cause).or_default() += count;
         }
     }
-}
-
-/// Whether independent paths come about by connections over manifolds as well.
-fn links(scene: &Scene, family: Family, mutations: &Mutations) -> bool {
-    family == Family::Fused && mutations.path_space.links(scene)
 }
 
 /// How far the numbers of each row of a state move.

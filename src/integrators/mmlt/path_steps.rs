@@ -2,7 +2,6 @@
 
 use super::chain::{Chain, LARGE, PRIMARY};
 use super::lane::{Lane, Work};
-use super::links;
 use crate::markov::{ChainState, Tracer, retell};
 use crate::math::Stream;
 use crate::path_space::{Drawn, Mixture, Proposed, Ways};
@@ -35,7 +34,7 @@ impl Lane {
         mut draws: Stream,
         mut stream: Stream,
     ) -> Option<Chain> {
-        let found = if links(scene, self.family, &self.mutations) {
+        let found = if mixture.links() {
             let Drawn { found, .. } = self.draw(scene, tracer, (mixture, Ways::All), &mut draws)?;
             self.confirm(scene, tracer, found, None, &mut state, &mut stream).ok()?
         } else {
