@@ -37,6 +37,7 @@ pub(super) struct MutationArguments {
     #[arg(long, value_name = "EDGES")]
     tries_from: Option<usize>,
     /// Share of the small steps in whose place paths move in path space: fused.
+    /// Where a pilot run finds that they pay more or less than small steps do, the odds follow.
     #[arg(long, value_name = "SHARE", default_value_t = 0.15, allow_negative_numbers = true)]
     path_step: f64,
     /// Roughness below which vertices with nothing but a microfacet lobe move with their chain: mlt, fused.

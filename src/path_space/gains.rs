@@ -17,6 +17,9 @@ pub struct Weights([f64; Kind::ALL.len()]);
 /// What a mutation is worth that pays least, relative to the one that pays best: a pilot run may err.
 const LEAST: f64 = 0.1;
 
+/// How far the odds between path space and primary sample space may turn from the usual ones.
+const MOST_ODDS: f64 = 4.0;
+
 impl Weights {
     /// All of `kinds` alike.
     pub fn even(kinds: Kinds) -> Self {
@@ -30,6 +33,18 @@ impl Weights {
             return Self::even(kinds);
         }
         Self(Kind::ALL.map(|kind| if kinds.has(kind) { (gains[kind as usize].rate() / best).max(LEAST) } else { 0.0 }))
+    }
+
+    /// Which share of a chain's small steps path space has, of which it has the share `usual` where both ways pay as much: the
+    /// odds follow what it pays beside `primary`, the small steps in primary sample space, within bounds.
+    pub fn share(&self, usual: f64, gains: &[Gain; Kind::ALL.len()], primary: &Gain) -> f64 {
+        let mut path = Gain::default();
+        for (gain, weight) in gains.iter().zip(self.0) {
+            path.merge(&Gain { way: weight * gain.way, cost: weight * gain.cost });
+        }
+        let [path, primary] = [path.rate(), primary.rate()];
+        let ratio = if path + primary > 0.0 { (path / primary).clamp(1.0 / MOST_ODDS, MOST_ODDS) } else { 1.0 };
+        usual * ratio / (usual * ratio + 1.0 - usual)
     }
 
     /// That of `kind`; 0 where it is not drawn.
@@ -86,6 +101,23 @@ pub fn way(scene: &Scene, from: &FullPath, to: &FullPath) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_space_that_pays_has_more_steps() {
+        let gain = |way| Gain { way, cost: 2.0 };
+        let gains = [gain(1.0); Kind::ALL.len()];
+        let share = |usual, primary| Weights::even(Kind::ALL.to_vec().into()).share(usual, &gains, &gain(primary));
+        let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} for {b}");
+        close(share(0.15, 1.0), 0.15);
+        close(share(0.2, 0.5), 0.2 * 2.0 / (0.2 * 2.0 + 0.8));
+        close(share(0.2, 1e-3), 0.2 * MOST_ODDS / (0.2 * MOST_ODDS + 0.8));
+        close(share(0.2, 0.0), share(0.2, 1e-3));
+        close(share(0.2, 1e3), 0.2 / (0.2 + 0.8 * MOST_ODDS));
+        close(share(0.0, 1.0), 0.0);
+        close(share(1.0, 7.0), 1.0);
+        let nothing = [Gain::default(); Kind::ALL.len()];
+        close(Weights::even(vec![Kind::Lens].into()).share(0.2, &nothing, &gain(0.0)), 0.2);
+    }
 
     #[test]
     fn what_pays_is_drawn() {

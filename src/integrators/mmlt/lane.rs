@@ -12,6 +12,9 @@ use crate::path_space::{Gain, Mixture, PathSpace, Target, Ways, way};
 use crate::paths::{Found, FullPath};
 use crate::scene::{Caster, Scene};
 
+/// Share of the small steps in whose place paths move in path space in a pilot run.
+const PILOT_PATH_STEP: f64 = 0.5;
+
 /// What mutations bring, by their kind.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Pilot {
@@ -52,6 +55,8 @@ pub(super) struct Work<'a> {
     pub scene: &'a Caster<'a>,
     pub tracer: Tracer,
     pub mixture: &'a Mixture,
+    /// Share of the small steps in whose place paths move in path space.
+    path_step: f64,
     kernel: &'a Kernel,
     splats: &'a mut Splats,
     /// What one mutation adds.
@@ -110,10 +115,11 @@ impl Lane {
         let (caster, mut splats) = (Caster::new(scene), Splats::new(size));
         let mut chains = std::mem::take(&mut self.chains);
         let run = |(chain, share): (&mut Option<Chain>, &Share)| {
-            let Share { tracer, worth, mutations, weights, ref mixture } = *share;
+            let Share { tracer, worth, mutations, weights, path_step, ref mixture } = *share;
             self.path_space.weights = weights;
             let (scene, splats) = (&caster, &mut splats);
-            let mut work = Work { scene, tracer, mixture, kernel, splats, worth, large_steps: Light::default() };
+            let large_steps = Light::default();
+            let mut work = Work { scene, tracer, mixture, path_step, kernel, splats, worth, large_steps };
             if let Some(chain) = chain {
                 for _ in 0..own(mutations) {
                     self.mutate(chain, &mut work);
@@ -140,7 +146,8 @@ impl Lane {
         let mut chain = Chain { stream, ..chain.clone() };
         let (caster, mut splats) = (Caster::new(scene), Splats::new(size));
         let (scene, splats) = (&caster, &mut splats);
-        let mut work = Work { scene, tracer, mixture, kernel, splats, worth: 0.0, large_steps: Light::default() };
+        let (path_step, large_steps) = (PILOT_PATH_STEP, Light::default());
+        let mut work = Work { scene, tracer, mixture, path_step, kernel, splats, worth: 0.0, large_steps };
         self.pilot = Some(Pilot::default());
         for _ in 0..mutations {
             self.mutate(&mut chain, &mut work);
@@ -173,15 +180,10 @@ impl Lane {
                 return;
             }
         }
-        if self.family == Family::Fused && chain.stream.number() < self.path_share() {
+        if work.path_step > 0.0 && chain.stream.number() < work.path_step {
             return self.path_step(chain, work);
         }
         self.small_step(chain, work);
-    }
-
-    /// Share of the small steps in whose place paths move in path space; in a pilot run many do.
-    fn path_share(&self) -> f64 {
-        if self.pilot.is_some() { 0.5 } else { self.mutations.path_step }
     }
 
     /// Another technique for the same path.

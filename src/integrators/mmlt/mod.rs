@@ -47,6 +47,8 @@ struct Length {
     worth: Worth,
     /// How often each mutation in path space is drawn.
     weights: Weights,
+    /// Share of the small steps in whose place paths move in path space.
+    path_step: f64,
     /// How independent paths in path space are drawn.
     mixture: Arc<Mixture>,
 }
@@ -60,6 +62,8 @@ struct Share {
     worth: f64,
     /// How often each mutation in path space is drawn.
     weights: Weights,
+    /// Share of the small steps in whose place paths move in path space.
+    path_step: f64,
     /// How independent paths in path space are drawn.
     mixture: Arc<Mixture>,
 }
@@ -91,7 +95,8 @@ impl Mmlt {
                 let weights = Weights::even(mutations.path_space.kinds);
                 let (light, worth) = (Light::default(), Worth::default());
                 let mixture = Arc::new(Mixture::even(scene, &mutations.path_space, edges, seeds.clone()));
-                Length { tracer, scales, light, batches: 0, worth, weights, mixture }
+                let path_step = if family == Family::Fused { mutations.path_step } else { 0.0 };
+                Length { tracer, scales, light, batches: 0, worth, weights, path_step, mixture }
             })
             .collect();
         Self {
@@ -115,7 +120,7 @@ impl Mmlt {
         for part in batches {
             self.begin(scene, index, samples.div_ceil(*part));
         }
-        if self.family == Family::Fused && self.mutations.path_step > 0.0 {
+        if self.lengths[index].path_step > 0.0 {
             self.adapt(scene, kernel, index);
         }
     }
@@ -167,6 +172,7 @@ impl Mmlt {
         }
         let path = std::array::from_fn(|kind| gains[chain::PRIMARY.len() + kind]);
         length.weights = Weights::of(kinds, &path);
+        length.path_step = length.weights.share(self.mutations.path_step, &path, &gains[chain::SMALL]);
     }
 
     /// How a pass divides one mutation per pixel among the lengths: in proportion to their light, or to what is due to it.
@@ -178,8 +184,8 @@ impl Mmlt {
             let b = length.light.mean();
             let mutations = if b > 0.0 { (due(length) / total * pixels).ceil() } else { 0.0 };
             let worth = length.worth.next(b) * pixels / mutations.max(1.0);
-            let Length { tracer, weights, ref mixture, .. } = *length;
-            Share { tracer, mutations: mutations as u64, worth, weights, mixture: mixture.clone() }
+            let Length { tracer, weights, path_step, ref mixture, .. } = *length;
+            Share { tracer, mutations: mutations as u64, worth, weights, path_step, mixture: mixture.clone() }
         };
         self.lengths.iter_mut().map(part).collect()
     }
