@@ -10,11 +10,11 @@ mod common;
 use common::{SIGMAS, rooms};
 use pathblend::film::{Health, PathClass};
 use pathblend::markov::Tracer;
-use pathblend::math::Stream;
+use pathblend::math::{Stream, pick};
 use pathblend::path_space::{
     Drawn, Gain, Kind, Lengths, Mixture, PathMutations, PathSpace, Proposed, Radii, Seeds, Target, Ways, Weights,
 };
-use pathblend::paths::{Found, FullPath, Techniques, connect_visible};
+use pathblend::paths::{Found, FullPath, TECHNIQUES, Techniques, connect_visible};
 use pathblend::scene::{Caster, Scene};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -160,6 +160,17 @@ fn draw(
     Some((Found { value: alone.value, luminance: alone.value.luminance(), ..found }, worth))
 }
 
+/// What a path contributes after a jump, which leaves the path as it was found.
+fn jumped(path: &FullPath, found: &Found, stream: &mut Stream) -> Found {
+    let (heuristic, mut densities) = (TECHNIQUES.heuristic.expect("weights"), Vec::new());
+    path.densities(&mut densities);
+    let weights = densities.iter().map(|density| heuristic.apply(*density));
+    let technique = pick(weights, stream.number()).unwrap_or(found.technique);
+    let share = |technique: usize| heuristic.apply(densities[technique]) / densities[technique];
+    let factor = share(technique) / share(found.technique);
+    Found { value: found.value * factor, luminance: found.luminance * factor, technique, ..*found }
+}
+
 /// How independent paths come about: in which ways, and whether these are adapted to what they find.
 const DRAWS: [(Ways, bool); 3] = [(Ways::Known, false), (Ways::All, false), (Ways::All, true)];
 
@@ -221,7 +232,7 @@ fn flows(
     let mut by_techniques = PathSpace::new(techniques, target);
     let even = |edges| Mixture::even(scene, &techniques, edges, Arc::default());
     let even: Vec<Mixture> = (lengths.least..=lengths.most).map(even).collect();
-    let mut damping = |(found, path): (&Found, &FullPath), stream: &mut Stream| {
+    let mut damping = |(found, path): (&Found, &mut FullPath), stream: &mut Stream| {
         let mixture = &even[path.edges() - lengths.least];
         let worth = by_techniques.worth(&caster, (path, found), (mixture, Ways::Known), stream);
         worth.map_or(0.0, |worth| (MOST_WORTH / worth).min(1.0))
@@ -229,12 +240,16 @@ fn flows(
     let mut of_independent = DRAWS.map(|_| Flows::default());
     for _ in 0..paths {
         let edges = lengths.least + (stream.number() * lengths.count() as f64) as usize;
-        let Some((found, worth)) = draw(target, edges, &caster, &mut stream, &mut path) else { continue };
-        let own = damping((&found, &path), &mut stream);
+        let Some((mut found, worth)) = draw(target, edges, &caster, &mut stream, &mut path) else { continue };
+        if target == Target::Technique && stream.number() < 0.5 {
+            found = jumped(&path, &found, &mut stream);
+        }
+        let own = damping((&found, &mut path.clone()), &mut stream);
         for (space, flows) in &mut spaces {
-            let Proposed { outcome, .. } = space.propose(&caster, (&path, &found), &mut stream, &mut proposal);
+            let current = (&mut path.clone(), &found);
+            let Proposed { outcome, .. } = space.propose(&caster, current, &mut stream, &mut proposal);
             if let Ok((next, ratio)) = outcome {
-                let damped = own.min(damping((&next, &proposal), &mut stream));
+                let damped = own.min(damping((&next, &mut proposal), &mut stream));
                 flows.add(target, worth * ratio.min(1.0) * damped, [(&found, &path), (&next, &proposal)]);
             }
         }
@@ -242,10 +257,11 @@ fn flows(
             let [from, to] = [edges - lengths.least, (stream.number() * lengths.count() as f64) as usize]
                 .map(|place| (&mixtures[place][usize::from(adapted)], ways));
             if let Some(next) = independent(sampler, &caster, to, &mut stream, &mut proposal)
-                && let Some(from) = sampler.worth(&caster, (&path, &found), from, &mut stream)
+                && next.known
+                && let Some(from) = sampler.worth(&caster, (&mut path.clone(), &found), from, &mut stream)
             {
                 let acceptance = (next.worth / from).min(1.0);
-                let damped = own.min(damping((&next.found, &proposal), &mut stream));
+                let damped = own.min(damping((&next.found, &mut proposal), &mut stream));
                 flows.add(target, worth * acceptance * damped, [(&found, &path), (&next.found, &proposal)]);
             }
         }

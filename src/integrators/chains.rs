@@ -144,16 +144,27 @@ pub(super) fn independent<M, T: Clone + Send>(
     chunks.concat()
 }
 
-/// Where the chains of each lane begin: at samples drawn in proportion to their `targets`, so that chains have their
-/// distribution from the first step on. The number of a sample and the chain's own random numbers, which differ by
-/// `family`; nothing where no sample has found light.
-pub(super) fn starts(targets: &[f64], seed: u64, family: u64) -> impl Iterator<Item = (usize, Stream)> {
-    let choice = Discrete::new(targets);
-    (0..LANES as u64).map_while(move |lane| {
-        let mut stream = Stream::new(seed, &[3, family, lane]);
-        let (chosen, _) = choice.as_ref()?.sample(stream.number());
-        Some((chosen, stream))
-    })
+/// How often a lane's chain tries to begin.
+const ATTEMPTS: usize = 16;
+
+/// Has the chain of each lane begin at a sample drawn in proportion to its `targets`, so that chains have their distribution
+/// from the first step on. `begin` takes the lane, the number of the sample and the chain's own random numbers, which differ by
+/// `family`; where it cannot begin there, another sample is drawn. Nothing begins where no sample has found light.
+pub(super) fn start(
+    targets: &[f64],
+    seed: u64,
+    family: u64,
+    mut begin: impl FnMut(usize, usize, Stream) -> Option<()>,
+) {
+    let Some(choice) = Discrete::new(targets) else { return };
+    for lane in 0..LANES {
+        let mut stream = Stream::new(seed, &[3, family, lane as u64]);
+        let mut attempt = || {
+            let (chosen, _) = choice.sample(stream.number());
+            begin(lane, chosen, stream.clone())
+        };
+        (0..ATTEMPTS).find_map(|_| attempt());
+    }
 }
 
 #[cfg(test)]

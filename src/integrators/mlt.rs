@@ -7,7 +7,7 @@
 //!
 //! Light seen directly is rendered by path tracing, and so is direct light unless the settings say otherwise.
 
-use super::chains::{LANES, Mean, Worth, batch_samples, independent, share, starts};
+use super::chains::{LANES, Mean, Worth, batch_samples, independent, share, start};
 use super::{Acceptance, ChainReport, Counts, path::Path, render::Settings};
 use crate::film::{Film, Health, Kernel, Splats};
 use crate::manifold::Rejection;
@@ -92,17 +92,19 @@ impl Mlt {
         let stream = |number: usize| Stream::new(seed, &[2, 0, batch, number as u64]);
         let memory = || Lane::new(self.mutations, Target::Path(lengths));
         let targets = independent(scene, samples, memory, |caster, lane, number| {
-            lane.sample(caster, mixtures, &mut stream(number)).map_or(0.0, |drawn| drawn.worth)
+            let drawn = lane.sample(caster, mixtures, &mut stream(number));
+            drawn.map_or((0.0, false), |drawn| (drawn.worth, drawn.known))
         });
         self.batches += 1;
-        targets.iter().for_each(|target| self.mean.add(*target));
+        targets.iter().for_each(|(target, _)| self.mean.add(*target));
         if self.lanes.iter().any(|lane| lane.chain.is_some()) {
             return samples as u64;
         }
         let caster = Caster::new(scene);
-        for (lane, (chosen, own)) in self.lanes.iter_mut().zip(starts(&targets, seed, 0)) {
-            lane.start(&caster, mixtures, &mut stream(chosen), own);
-        }
+        let may_start: Vec<f64> = targets.iter().map(|(target, known)| if *known { *target } else { 0.0 }).collect();
+        start(&may_start, seed, 0, |number, chosen, own| {
+            self.lanes[number].start(&caster, mixtures, &mut stream(chosen), own)
+        });
         samples as u64
     }
 
@@ -159,10 +161,11 @@ impl Lane {
     }
 
     /// Begins at the sample that `draws` gives.
-    fn start(&mut self, scene: &Caster<'_>, mixtures: &[Mixture], draws: &mut Stream, stream: Stream) {
-        let Some(Drawn { found: current, .. }) = self.sample(scene, mixtures, draws) else { return };
+    fn start(&mut self, scene: &Caster<'_>, mixtures: &[Mixture], draws: &mut Stream, stream: Stream) -> Option<()> {
+        let Drawn { found: current, .. } = self.sample(scene, mixtures, draws)?;
         let (path, tallies, rejections) = (std::mem::take(&mut self.proposal), Default::default(), BTreeMap::new());
         self.chain = Some(Chain { stream, current, path, weight: 0.0, tallies, rejections });
+        Some(())
     }
 
     fn run(&mut self, scene: &Caster<'_>, mutations: u64, worth: f64, kernel: &Kernel, size: [usize; 2]) -> Job {

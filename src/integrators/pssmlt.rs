@@ -11,7 +11,7 @@
 //! Light seen directly is rendered by path tracing, and so is direct light unless the settings say otherwise.
 
 use super::bdpt::ROULETTE_FROM;
-use super::chains::{LANES, Mean, Worth, batch_samples, independent, share, starts};
+use super::chains::{LANES, Mean, Worth, batch_samples, independent, share, start};
 use super::{Acceptance, ChainReport, Counts, path::Path, render::Settings};
 use crate::film::{Film, Health, Kernel, PathClass, Splats};
 use crate::markov::{ChainState, Mutations};
@@ -113,13 +113,14 @@ impl Pssmlt {
         self.batches += 1;
         targets.iter().for_each(|target| self.mean.add(*target));
         let caster = Caster::new(scene);
-        for (lane, (chosen, own)) in self.lanes.iter_mut().zip(starts(&targets, seed, 0)) {
-            let mut state = state.clone();
+        start(&targets, seed, 0, |number, chosen, own| {
+            let (lane, mut state) = (&mut self.lanes[number], state.clone());
             lane.find(&caster, lengths, &mut state, &mut stream(chosen));
             state.accept();
             let current = std::mem::take(&mut lane.proposal);
             lane.chain = Some(Chain { state, stream: own, current, tallies: Default::default() });
-        }
+            Some(())
+        });
     }
 
     pub(super) fn pass(&mut self, scene: &Scene, film: &mut Film, pass: u64, counts: &mut Counts) {

@@ -38,7 +38,7 @@ const ALIKE: f64 = 0.9;
 
 /// Whether some vertex could be linked.
 pub(super) fn suits(scene: &Caster<'_>, course: &Course) -> bool {
-    scene.refracts() && (2..course.edges()).any(|d| is_free(course, d))
+    scene.links() && (2..course.edges()).any(|d| is_free(course, d))
 }
 
 /// The first free vertex from the light on, if there are smooth boundaries before it: the one that the connection would have
@@ -76,7 +76,7 @@ pub(super) fn propose(
     if !is_free(new, d) {
         return Err(Rejection::Dark);
     }
-    Ok(Draft { technique, ratio: 1.0, ranges: Some([part, part]), linked: Some(d) })
+    Ok(Draft { technique, ratio: 1.0, ranges: None, linked: Some(d) })
 }
 
 /// Where a walk to a light begins.
@@ -120,7 +120,7 @@ fn straight(scene: &Caster<'_>, from: &Node, light: &Node, count: usize) -> Resu
     let VertexKind::Light(_, Start::Surface { .. }) = light.kind else { return Err(Rejection::Unsuitable) };
     let direction = (light.position - from.position).try_normalize().ok_or(Rejection::Singular)?;
     let bend = |surface: &Surface, direction: DVec3| pass(scene, surface, direction);
-    Way::trace(scene, from, count, direction, bend)?.settle(scene, from, light)
+    Trail::trace(scene, from, count, direction, bend)?.settle(scene, from, light)
 }
 
 /// Where light goes that passes a smooth boundary along `direction`; `None` where it is reflected totally, or no law is known.
@@ -155,7 +155,7 @@ fn random(
             true => reflect(surface, direction),
             false => pass(scene, surface, direction),
         };
-        Way::trace(scene, from, d - 1, direction, bend)
+        Trail::trace(scene, from, d - 1, direction, bend)
     };
     let mut mirrors = bends.iter().rev().filter(|bend| bend.reflected).peekable();
     if mirrors.peek().is_some() && stream.number() >= AS_TRIED {
@@ -179,14 +179,14 @@ fn attempt(
     (course, d): (&Course, usize),
     stream: &mut Stream,
     bends: &mut ArrayVec<Bend, MOST_LINKS>,
-) -> Result<(DVec3, Way), Rejection> {
+) -> Result<(DVec3, Trail), Rejection> {
     let from = &course.nodes[d];
     let surface = from.surface().ok_or(Rejection::Unsuitable)?;
     let back = course.direction(scene, d).ok_or(Rejection::Singular)?;
     let scatter = scene.scatter(surface, surface.frame.to_local(back), stream.row(), Walk::FromCamera);
     let scatter = scatter.filter(|scatter| !scatter.delta).ok_or(Rejection::Unsuitable)?;
     let direction = surface.frame.to_world(scatter.direction);
-    let way = Way::trace(scene, from, d - 1, direction, |surface, direction| {
+    let way = Trail::trace(scene, from, d - 1, direction, |surface, direction| {
         let passed = if stream.number() < 0.5 { pass(scene, surface, direction) } else { None };
         let (position, normal) = (surface.position, surface.frame.normal);
         bends.try_push(Bend { position, normal, reflected: passed.is_none() }).ok()?;
@@ -201,13 +201,13 @@ fn reflect(surface: &Surface, direction: DVec3) -> Option<DVec3> {
 }
 
 /// A way through smooth boundaries, which need not lead to a light.
-struct Way {
+struct Trail {
     surfaces: ArrayVec<(Surface, bool), MOST_LINKS>,
     /// Where it leads.
     direction: DVec3,
 }
 
-impl Way {
+impl Trail {
     /// Sets out along `direction` and meets `count` surfaces, at each of which it goes on as `bend` says.
     fn trace(
         scene: &Caster<'_>,

@@ -1,7 +1,7 @@
 //! How often independent paths come about in which way.
 //!
-//! Before a scene is seen, all techniques are as likely. Where there are smooth boundaries, a quarter of the paths are linked,
-//! and where hidden light is sought a quarter by random seeds, with d drawn evenly. The light that first samples have found
+//! Before a scene is seen, all techniques are as likely. Where paths can be linked, a quarter of them are sought by random
+//! seeds (if they may be), and a quarter of the others are linked, with d drawn evenly. The light that first samples have found
 //! tells more. If each way is as likely as its paths have light, its share of E[f/q], the mixture is nearer to f than before
 //! (a step of expectation maximisation; Douc et al. 2007, "Convergence of adaptive mixtures of importance sampling schemes").
 //! Half of all paths come about as if nothing were known, so that no light that first samples have missed is worth more than
@@ -70,7 +70,7 @@ impl Mixture {
         Self { shares, even, sought, hidden: 0.0, edges, seeds }
     }
 
-    /// After samples of this mixture.
+    /// After samples of this mixture; without links it stays as it is.
     pub fn adapted<'a>(&self, samples: impl Iterator<Item = &'a Drawn>) -> Self {
         let (mut light, mut hidden) = (vec![0.0; self.shares.len()], 0.0);
         for drawn in samples {
@@ -78,7 +78,7 @@ impl Mixture {
             hidden += if drawn.hidden { drawn.worth } else { 0.0 };
         }
         let total: f64 = light.iter().sum();
-        if !(total > 0.0 && total.is_finite()) {
+        if !(self.links() && total > 0.0 && total.is_finite()) {
             return self.clone();
         }
         let share = |(even, light): (&f64, f64)| KEPT * even + (1.0 - KEPT) * light / total;
@@ -148,7 +148,7 @@ impl Mixture {
 impl PathMutations {
     /// Whether independent paths come about in more ways than the techniques have.
     pub fn links(&self, scene: &Scene) -> bool {
-        self.kinds.has(Kind::Connection) && scene.refracts()
+        self.kinds.has(Kind::Connection) && scene.links()
     }
 }
 
@@ -201,7 +201,7 @@ mod tests {
         let (before, way) = (mixture(), Way::Seek(3));
         let (value, class, film) = (Spectrum::ONE, PathClass::LONGER, DVec2::ZERO);
         let found = Found { value, luminance: 1.0, class, film, technique: 0 };
-        let drawn = Drawn { found, worth: 2.0, way, hidden: true };
+        let drawn = Drawn { found, worth: 2.0, known: true, way, hidden: true };
         let after = before.adapted([drawn, drawn].iter()).adapted([drawn].iter());
         for (place, (before, after)) in before.shares.iter().zip(&after.shares).enumerate() {
             let light = if place == mixture().place(way) { 0.5 } else { 0.0 };

@@ -200,15 +200,16 @@ impl PathSpace {
         }
     }
 
-    /// Mutates `path`, which contributes `current`; the new path is left in `proposal`.
+    /// Mutates `path`, which contributes `current`, and becomes what the technique of that finds, if it was another's; the new
+    /// path is left in `proposal`.
     pub fn propose(
         &mut self,
         scene: &Caster<'_>,
-        (path, current): (&FullPath, &Found),
+        (path, current): (&mut FullPath, &Found),
         stream: &mut Stream,
         proposal: &mut FullPath,
     ) -> Proposed {
-        if !self.old.follow(path) {
+        if !self.follow(scene, path, current.technique) {
             return Proposed { kind: None, outcome: Err(Rejection::Unsuitable) };
         }
         let view = View { scene, technique: path.light.vertices.len(), mutations: self.mutations };
@@ -234,6 +235,23 @@ impl PathSpace {
             Ok((found.0, found.1 * choice))
         });
         Proposed { kind: Some(kind), outcome }
+    }
+
+    /// Has the old course be that of `path`, and `path` be what `technique` finds: jumps leave it as another has found it. Says
+    /// whether it could.
+    fn follow(&mut self, scene: &Caster<'_>, path: &mut FullPath, technique: usize) -> bool {
+        let Self { old, walked, target, .. } = self;
+        if !old.follow(path) {
+            return false;
+        }
+        if path.light.vertices.len() == technique {
+            return true;
+        }
+        let found = realise(scene, old, technique, (&target.techniques(), 1.0), walked);
+        if found.is_some() {
+            std::mem::swap(path, walked);
+        }
+        found.is_some()
     }
 
     /// Draws a new course.

@@ -29,7 +29,8 @@
 //! As a large step it is exact as well. Take K into the state, with the target f σ K P(K | σ), whose sum over K is f. A path
 //! that is drawn comes with the density q P(K | σ), so the ratio of target and density is f K/(A + B), again what it is
 //! worth. A path that has come by another mutation draws its K anew, from K P(K | σ) σ: that is the law of K₁ + K₂ − 1 for
-//! two geometric numbers. More than [`MOST_ROUNDS`] end in a rejection, for both ways alike; only b misses such paths.
+//! two geometric numbers. [`MOST_ROUNDS`] or more end in a rejection, for both ways alike. For b such a path counts with as
+//! many rounds: where σ is a five-hundredth, b misses an eighth of its light.
 //! The mean of [`TRIALS`] such numbers stands for K, so that it varies less: of those of a path that has come by another
 //! mutation, one has that law, the others the geometric one.
 
@@ -42,7 +43,7 @@ use crate::paths::{Course, Found, FullPath, Random, Techniques, VertexKind, trac
 use crate::scene::Caster;
 
 /// How often K is drawn for one path; the mean of them stands for it.
-const TRIALS: u32 = 4;
+const TRIALS: usize = 4;
 /// The most rounds of a trial.
 const MOST_ROUNDS: u32 = 1000;
 
@@ -53,6 +54,8 @@ pub struct Drawn {
     pub found: Found,
     /// What it is worth: the luminance of f/q, in the mean.
     pub worth: f64,
+    /// Whether that is known: else it is worth as much at least, and no chain may take it.
+    pub known: bool,
     /// The way that it came by.
     pub way: Way,
     /// Whether its light is hidden from all but random seeds, and perhaps some technique.
@@ -96,13 +99,13 @@ impl PathSpace {
         path.densities(&mut self.densities);
         let Self { new, densities, mutations, walked, .. } = self;
         let density = density(scene, *mutations, (mixture, ways), new, densities, walked);
-        if matches!(way, Way::Seek(_)) && density.sought == 0.0 {
-            // Not hidden, and so none of its kind.
+        let hidden = density.hidden.is_some();
+        if matches!((way, hidden), (Way::Seek(_), false) | (Way::Link(_), true)) {
+            // None of its kind, and so not in its density.
             return None;
         }
-        let rounds = density.rounds((scene, new, &mixture.seeds), false, stream)?;
+        let (rounds, known) = density.rounds((scene, new, &mixture.seeds), false, stream);
         let worth = alone.luminance * rounds / (density.sure + density.sought);
-        let hidden = density.hidden.is_some();
         let found = match self.target.pick(&self.densities, stream) {
             Some(technique) => {
                 let contribution = (&self.target.techniques(), self.target.count(&self.new));
@@ -110,7 +113,7 @@ impl PathSpace {
             }
             None => alone,
         };
-        worth.is_finite().then_some(Drawn { found, worth, way, hidden })
+        worth.is_finite().then_some(Drawn { found, worth, known, way, hidden })
     }
 
     /// A path that is linked with a light, left in `self.new`.
@@ -133,46 +136,50 @@ impl PathSpace {
         connection::connect(scene, &self.old, d, seed, stream, &mut self.new).ok()
     }
 
-    /// What `path`, which contributes `current` to a chain, would be worth if it were drawn.
+    /// What `path`, which contributes `current` to a chain, would be worth if it were drawn; `None` where that cannot be known.
+    /// It becomes what the technique of `current` finds.
     pub fn worth(
         &mut self,
         scene: &Caster<'_>,
-        (path, current): (&FullPath, &Found),
+        (path, current): (&mut FullPath, &Found),
         (mixture, ways): (&Mixture, Ways),
         stream: &mut Stream,
     ) -> Option<f64> {
-        self.old.follow(path).then_some(())?;
+        self.follow(scene, path, current.technique).then_some(())?;
         path.densities(&mut self.densities);
         let weight = self.target.weight(&self.densities, current.technique);
         let alone = current.luminance / (self.target.count(&self.old) * weight);
         let Self { old, densities, mutations, walked, .. } = self;
         let density = density(scene, *mutations, (mixture, ways), old, densities, walked);
-        let rounds = density.rounds((scene, old, &mixture.seeds), true, stream)?;
+        let (rounds, known) = density.rounds((scene, old, &mixture.seeds), true, stream);
         let worth = alone * rounds / (density.sure + density.sought);
-        (worth.is_finite() && worth > 0.0).then_some(worth)
+        (known && worth.is_finite() && worth > 0.0).then_some(worth)
     }
 }
 
 impl Density {
-    /// The mean of K over [`TRIALS`], for a path that is drawn or for one that is `there` already; `None` where one is too large.
+    /// The mean of K over [`TRIALS`], for a path that is drawn or for one that is `there` already, and whether all of them are
+    /// known: those that are not count with [`MOST_ROUNDS`].
     fn rounds(
         &self,
         (scene, course, seeds): (&Caster<'_>, &Course, &Seeds),
         there: bool,
         stream: &mut Stream,
-    ) -> Option<f64> {
-        let Some(d) = self.hidden.filter(|_| self.sought > 0.0) else { return Some(1.0) };
+    ) -> (f64, bool) {
+        let Some(d) = self.hidden.filter(|_| self.sought > 0.0) else { return (1.0, true) };
         let heads = self.sought / (self.sure + self.sought);
         let mut trial = || {
-            (1..MOST_ROUNDS).find(|_| stream.number() >= heads || connection::finds(scene, course, d, seeds, stream))
+            (1..MOST_ROUNDS)
+                .find(|_| stream.number() >= heads || connection::finds(scene, course, d, seeds, stream))
+                .unwrap_or(MOST_ROUNDS)
         };
-        let mut rounds = 0;
-        for number in 0..TRIALS {
+        let rounds: [u32; TRIALS] = std::array::from_fn(|number| {
             // Of a path that is there, many rounds are more likely.
-            let more = if there && number == 0 { trial()? - 1 } else { 0 };
-            rounds += Some(trial()? + more).filter(|rounds| *rounds < MOST_ROUNDS)?;
-        }
-        Some(f64::from(rounds) / f64::from(TRIALS))
+            let more = if there && number == 0 { trial() - 1 } else { 0 };
+            (trial() + more).min(MOST_ROUNDS)
+        });
+        let mean = f64::from(rounds.iter().sum::<u32>()) / TRIALS as f64;
+        (mean, rounds.iter().all(|rounds| *rounds < MOST_ROUNDS))
     }
 }
 

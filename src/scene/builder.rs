@@ -294,7 +294,7 @@ impl Builder {
             solids: self.solids,
             solid_shapes: self.solid_shapes,
             shapes: self.shapes,
-            refracts: self.bsdfs.iter().any(refracts),
+            links: self.bsdfs.iter().any(refracts) && self.emitters.iter().any(has_surface),
             bsdfs: self.bsdfs,
             reliefs: self.reliefs,
             lights: Discrete::new(&powers),
@@ -304,6 +304,11 @@ impl Builder {
             bvh,
         })
     }
+}
+
+/// Whether a light that shines has a surface.
+fn has_surface(emitter: &Emitter) -> bool {
+    matches!(emitter, Emitter::Area(_)) && emitter.power() > 0.0
 }
 
 /// Whether a boundary is smooth and bends light.

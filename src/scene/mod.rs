@@ -81,8 +81,8 @@ pub struct Scene {
     solid_shapes: Vec<u32>,
     shapes: Vec<Shape>,
     bsdfs: Vec<Bsdf>,
-    /// Whether there are smooth boundaries that bend light.
-    refracts: bool,
+    /// Whether there are smooth boundaries that bend light, and lights with a surface.
+    links: bool,
     /// By scattering model.
     reliefs: Vec<Option<Relief>>,
     emitters: Vec<Emitter>,
@@ -203,9 +203,10 @@ impl Scene {
         self.bsdfs.iter().any(|bsdf| [DVec3::Z, -DVec3::Z].iter().any(|wi| bsdf.gathers(*wi)))
     }
 
-    /// Whether there are smooth boundaries that bend light.
-    pub fn refracts(&self) -> bool {
-        self.refracts
+    /// Whether paths can be linked with lights over manifolds: whether there are smooth boundaries that bend light, and lights
+    /// with a surface.
+    pub fn links(&self) -> bool {
+        self.links
     }
 
     /// All scattering models.

@@ -8,7 +8,7 @@ use crate::markov::{
     ChainState, ControlledMemory, Jump, JumpMemory, Jumps, Mutations, Tracer, Tries, controlled_step, jump,
 };
 use crate::math::Stream;
-use crate::path_space::{Gain, Mixture, PathSpace, Target, Ways, way};
+use crate::path_space::{Gain, Mixture, PathSpace, Target, Ways, Weights, way};
 use crate::paths::{Found, FullPath};
 use crate::scene::{Caster, Scene};
 
@@ -149,6 +149,7 @@ impl Lane {
         let (path_step, large_steps) = (PILOT_PATH_STEP, Light::default());
         let mut work = Work { scene, tracer, mixture, path_step, kernel, splats, worth: 0.0, large_steps };
         self.pilot = Some(Pilot::default());
+        self.path_space.weights = Weights::even(self.mutations.path_space.kinds);
         for _ in 0..mutations {
             self.mutate(&mut chain, &mut work);
         }
@@ -161,10 +162,11 @@ impl Lane {
         let kind = chain.stream.number();
         let large = self.mutations.large_step;
         if kind < large {
-            return if self.mutations.tries(work.tracer.edges) {
-                self.try_all(chain, work);
-            } else if work.mixture.links() {
+            // What tries find is not told apart into hidden light and other.
+            return if work.mixture.links() {
                 self.independent_step(chain, work);
+            } else if self.mutations.tries(work.tracer.edges) {
+                self.try_all(chain, work);
             } else {
                 self.large_step(chain, work);
             };

@@ -14,12 +14,12 @@ mod chain;
 mod lane;
 mod path_steps;
 
-use super::chains::{LANES, Light, Worth, batch_samples, independent, share, starts};
+use super::chains::{LANES, Light, Worth, batch_samples, independent, share, start};
 use super::{Acceptance, ChainReport, Counts, path::Path, render::Settings};
 use crate::film::{Film, Kernel, Splats};
 use crate::markov::{ChainState, Mutations, Scales, Tracer};
 use crate::math::{Stream, Walk};
-use crate::path_space::{Gain, Kinds, Mixture, Seeds, Ways, Weights};
+use crate::path_space::{Drawn, Gain, Kinds, Mixture, Seeds, Ways, Weights};
 use crate::paths::Open;
 use crate::scene::{Caster, Scene};
 use lane::{Job, Lane};
@@ -147,11 +147,17 @@ impl Mmlt {
             length.light.add((*target, drawn.is_some_and(|drawn| drawn.hidden)), Ways::All);
         }
         let caster = Caster::new(scene);
-        let luminances: Vec<f64> = targets.iter().map(|(target, ..)| *target).collect();
-        for (lane, (chosen, stream)) in self.lanes.iter_mut().zip(starts(&luminances, self.seed, edges)) {
-            let draws = Stream::new(self.seed, &key(chosen));
-            lane.chains[index] = lane.start(&caster, (tracer, mixture), state.clone(), draws, stream);
-        }
+        let may_start = |(target, drawn): &(f64, Option<Drawn>)| match drawn {
+            Some(Drawn { known: false, .. }) => 0.0,
+            _ => *target,
+        };
+        let luminances: Vec<f64> = targets.iter().map(may_start).collect();
+        start(&luminances, self.seed, edges, |number, chosen, stream| {
+            let (lane, draws) = (&mut self.lanes[number], Stream::new(self.seed, &key(chosen)));
+            let chain = lane.start(&caster, (tracer, mixture), state.clone(), draws, stream)?;
+            lane.chains[index] = Some(chain);
+            Some(())
+        });
         length.mixture = Arc::new(mixture.adapted(targets.iter().filter_map(|(_, drawn)| drawn.as_ref())));
     }
 

@@ -64,7 +64,7 @@ impl Lane {
         let ways = if stream.number() < work.mixture.seeking() { Ways::All } else { Ways::Known };
         let drawn = self.draw(work.scene, work.tracer, (work.mixture, ways), stream);
         work.large_steps.add(drawn.map_or((0.0, false), |drawn| (drawn.worth, drawn.hidden)), ways);
-        let proposal = drawn.and_then(|Drawn { found, worth, .. }| {
+        let proposal = drawn.filter(|drawn| drawn.known).and_then(|Drawn { found, worth, .. }| {
             let before = &mut known[ways as usize];
             if before.is_none() {
                 *before = self.path_space.worth(work.scene, (path, current), (work.mixture, ways), stream);
