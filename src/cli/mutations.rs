@@ -33,7 +33,8 @@ pub(super) struct MutationArguments {
     /// Small steps keep directions where surfaces change: mmlt, rjmlt, fused.
     #[arg(long)]
     controlled_steps: bool,
-    /// Large steps of paths with at least this many edges try all techniques of two full walks: mmlt, rjmlt, fused.
+    /// Large steps of paths with at least this many edges try all techniques of two full walks: mmlt, rjmlt, and fused where
+    /// nothing smooth bends light.
     #[arg(long, value_name = "EDGES")]
     tries_from: Option<usize>,
     /// Share of the small steps in whose place paths move in path space: fused.

@@ -172,6 +172,23 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_chain_that_cannot_begin_tries_another_sample() {
+        let mut begun = [0; LANES];
+        start(&[1.0, 0.0, 1.0], 1, 0, |lane, chosen, _| {
+            assert_ne!(chosen, 1);
+            (chosen == 2).then(|| begun[lane] += 1)
+        });
+        assert_eq!(begun, [1; LANES]);
+        let mut attempts = 0;
+        start(&[1.0], 1, 0, |..| {
+            attempts += 1;
+            None
+        });
+        assert_eq!(attempts, LANES * ATTEMPTS);
+        start(&[0.0], 1, 0, |..| unreachable!("nothing shines"));
+    }
+
+    #[test]
     fn passes_add_up_to_the_latest_mean() {
         let means = [0.0, 0.0, 4.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0];
         let mut worth = Worth::default();

@@ -28,7 +28,7 @@ pub enum FilmSteps {
     Pixels(f64),
 }
 
-/// How large steps choose the technique.
+/// How large steps choose the technique, in fused where paths are not linked with lights over manifolds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LargeSteps {
@@ -46,7 +46,7 @@ pub struct Mutations {
     pub large_step: f64,
     /// Probability of a technique jump, where jumps are separate; small steps have what is left.
     pub jump: f64,
-    /// How technique jumps come about, in rjmlt.
+    /// How technique jumps come about, in rjmlt and fused.
     pub jumps: Jumps,
     /// How far numbers move.
     pub small_step: SmallStep,

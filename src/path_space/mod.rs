@@ -119,7 +119,7 @@ struct Plan {
 /// A path's surroundings, as a mutation sees them.
 struct View<'a> {
     scene: &'a Caster<'a>,
-    /// Light vertices of the technique that the contribution is that of.
+    /// Light vertices of the technique that the contribution is that of, and by which the path is found.
     technique: usize,
     mutations: PathMutations,
 }

@@ -5,7 +5,8 @@
 //! of the image of length k. b_k comes from independent samples at the start and from every large step since.
 //!
 //! In `mmlt` a number of the state chooses the technique, and moves in small steps like the others. In `rjmlt` the
-//! technique stands apart: small steps keep it, and jumps change it without changing the path.
+//! technique stands apart: small steps keep it, and jumps change it without changing the path. `fused` is `rjmlt` whose paths
+//! also move in path space (Otsu 2017, chapter 6).
 //!
 //! Light seen directly is rendered by path tracing, and so is direct light unless the settings say otherwise, as in both
 //! papers.
@@ -36,6 +37,11 @@ pub(super) enum Family {
     /// From jumps, while paths also move in path space: `fused`.
     Fused,
 }
+
+/// The most first samples in two batches, where paths may be linked.
+const LINKED_SAMPLES: [usize; 2] = [25_000, 50_000];
+/// The most mutations of pilot runs.
+const PILOT_MUTATIONS: usize = 50_000;
 
 /// One path length.
 struct Length {
@@ -113,12 +119,12 @@ impl Mmlt {
     /// Draws independent samples of a length in which no light has been found; starts its chains where one finds some, and
     /// finds out how its paths had better move.
     fn explore(&mut self, scene: &Scene, kernel: &Kernel, index: usize) {
-        let samples = batch_samples(self.size, self.lengths[index].batches).div_ceil(self.lengths.len());
+        let samples = batch_samples(self.size, self.lengths[index].batches);
         // What the first of two batches finds tells how the second is drawn. Paths that may be linked take several times as
-        // long, so that there are fewer.
-        let batches: &[usize] = if self.lengths[index].mixture.links() { &[4, 2] } else { &[1] };
-        for part in batches {
-            self.begin(scene, index, samples.div_ceil(*part));
+        // long, so that there are at most so many.
+        let batches: &[usize] = if self.lengths[index].mixture.links() { &LINKED_SAMPLES } else { &[usize::MAX] };
+        for most in batches {
+            self.begin(scene, index, samples.min(*most).div_ceil(self.lengths.len()));
         }
         if self.lengths[index].path_step > 0.0 {
             self.adapt(scene, kernel, index);
@@ -164,7 +170,7 @@ impl Mmlt {
     /// Finds how often paths had better move how, by a run whose chains are thrown away.
     fn adapt(&mut self, scene: &Scene, kernel: &Kernel, index: usize) {
         let (seed, size, kinds) = (self.seed, self.size, self.mutations.path_space.kinds);
-        let mutations = (batch_samples(size, 0) / (2 * self.lengths.len() * LANES)) as u64;
+        let mutations = (batch_samples(size, 0).min(PILOT_MUTATIONS) / (self.lengths.len() * LANES)) as u64;
         let length = &mut self.lengths[index];
         let (tracer, mixture) = (length.tracer, &*length.mixture);
         let run = |(number, lane): (usize, &mut Lane)| {
