@@ -180,12 +180,12 @@ mod tests {
         });
         assert_eq!(begun, [1; LANES]);
         let mut attempts = 0;
-        start(&[1.0], 1, 0, |..| {
+        start(&[1.0], 1, 0, |_, _, _| {
             attempts += 1;
             None
         });
         assert_eq!(attempts, LANES * ATTEMPTS);
-        start(&[0.0], 1, 0, |..| unreachable!("nothing shines"));
+        start(&[0.0], 1, 0, |_, _, _| unreachable!("nothing shines"));
     }
 
     #[test]
