@@ -89,7 +89,7 @@ impl Mmlt {
     pub(super) fn start(scene: &Scene, settings: &Settings, family: Family) -> Self {
         let mut mutations = settings.mutations;
         if family != Family::Fused {
-            mutations.path_space.kinds = Kinds::NONE;
+            (mutations.path_space.kinds, mutations.path_step) = (Kinds::NONE, 0.0);
         }
         let direct = mutations.traced_edges();
         let (size, open) = (scene.camera.size, Open::of(scene));
@@ -101,8 +101,7 @@ impl Mmlt {
                 let weights = Weights::even(mutations.path_space.kinds);
                 let (light, worth) = (Light::default(), Worth::default());
                 let mixture = Arc::new(Mixture::even(scene, &mutations.path_space, edges, seeds.clone()));
-                let path_step = if family == Family::Fused { mutations.path_step } else { 0.0 };
-                Length { tracer, scales, light, batches: 0, worth, weights, path_step, mixture }
+                Length { tracer, scales, light, batches: 0, worth, weights, path_step: mutations.path_step, mixture }
             })
             .collect();
         Self {
